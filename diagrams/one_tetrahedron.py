@@ -25,6 +25,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
+from tetra_drake.laws.contact import MODE_COLUMNS, STICK_POINT
 from tetra_drake.laws.kinematics import P_WN, V_WN
 from tetra_drake.robot.robot import Robot, make_model
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure, moved_nodes
@@ -55,6 +56,8 @@ class Samples:
     """Friction forces along t1 and t2 (samples, 3, 2); on flat ground along x and y."""
     modes: np.ndarray
     """Modes (samples, 3, 3): contact, and friction modes along t1 and t2; see GroundContact."""
+    stick_points: np.ndarray
+    """Stick points along x (samples, 3)."""
 
 
 def make_standing_tetrahedron(scenario: Scenario) -> Robot:
@@ -116,7 +119,7 @@ def make_diagram(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Diagr
 
     state = plant.get_state_output_port()
     LogVectorOutput(state, builder).set_name("state_log")
-    for port in ("normal_forces", "friction_forces", "modes"):
+    for port in ("normal_forces", "friction_forces", "modes", "mode_table"):
         LogVectorOutput(ground.GetOutputPort(port), builder).set_name(f"{port}_log")
     if meshcat:
         add_robot(meshcat, tetrahedron.structure)
@@ -167,6 +170,7 @@ def let_go(
         normal_forces=logged("normal_forces"),
         friction_forces=logged("friction_forces").reshape(-1, len(BASE), 2),
         modes=logged("modes").reshape(-1, len(BASE), 3),
+        stick_points=logged("mode_table").reshape(-1, len(BASE), MODE_COLUMNS)[..., STICK_POINT],
     )
 
 

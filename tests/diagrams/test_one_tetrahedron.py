@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from one_tetrahedron import BASE, LEADING, TRAILING, weight
 from settling_node import IMPACT_SPEED, bounce, contact_speeds, settle, velocity_correction
-from sliding_tetrahedron import INITIAL_SPEED, flights, slide, slips, travel
+from sliding_tetrahedron import INITIAL_SPEED, deflections, flights, slide, slips, travel
 
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
@@ -16,7 +16,7 @@ STICKS = [1.0, 0.0, 0.0]
 
 @pytest.fixture(scope="module")
 def sliding():
-    return slide(load_scenario("thesis"))
+    return slide(load_scenario("thesis-reversal"))
 
 
 def impulse(forces, times):
@@ -69,9 +69,18 @@ def test_it_breaks_free_at_the_stiction_range_and_sticks_again(scenario, sliding
     assert (sliding.modes[after, LEADING] == STICKS).all()
     [(lifted, landed)] = flights(sliding, TRAILING)
     assert lifted < 1e-3 < landed < end
-    slow = slide(scenario, speed=3.0 * INCH, duration=0.03)
-    assert all(slips(slow, node) == [] for node in BASE)
-    assert 0.0 < travel(slow, LEADING)[-1] < scenario.friction.stiction_range
+
+
+def test_where_deflections_restart_at_the_range_it_never_slips(scenario):
+    p0, slow = scenario.friction.stiction_range, slide(scenario, speed=3.0 * INCH, duration=0.03)
+    assert 0.0 < travel(slow, LEADING)[-1] < p0
+    fast = slide(scenario, speed=100.0 * INCH, duration=4e-3)
+    assert all(slips(motion, node) == [] for motion in (slow, fast) for node in BASE)
+    # Four stiction ranges, and a sawtooth that jumps to zero at each.
+    jumps, bend = np.diff(fast.stick_points[:, LEADING]), deflections(fast, LEADING)
+    np.testing.assert_allclose(jumps[jumps != 0.0], p0, rtol=1e-9)
+    assert np.count_nonzero(jumps) == travel(fast, LEADING)[-1] // p0 == 4
+    assert 0.9 * p0 < np.nanmax(bend) < 1.05 * p0, "at the ends of steps"
 
 
 def test_friction_takes_all_the_momentum(scenario, sliding):

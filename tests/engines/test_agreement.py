@@ -219,6 +219,7 @@ def rows() -> Iterable[Any]:
     within |= {"length": 1e-6, "tension": 1e-3, "signal": 1e-9}
     for count in (2, 5, 8):
         changes = {"robot.tetrahedra": count, "robot.gravity": 0.0, "cpg.start_up": "0.105 s"}
+        changes |= {"cpg.signals": "listing"}
         changes |= {"robot.offsets": [[0.0, 0.0, "1 m"]] * count}
         engines, name = (FINE[0], Limit(4e-5)), f"{count} tetrahedra in the air, MuJoCo"
         yield row(name, "thesis", 0.2, changes, engines, within, gait(), 1e-3)

@@ -58,7 +58,7 @@ def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scena
     changes = {"robot.tetrahedra": 3, "cpg.start_up": "0 s"} | changes
     robot = Robot.of(scenario.with_changes(changes))
     diagram = MakeTensegrityDiagram(robot, seeded_gait(robot.scenario))
-    engine, there = robot.scenario.engine, []
+    engine, there = Drake(max_step=8e-3), []
     simulator = MakeSimulator(diagram, robot, engine)
     sampler = Sampler(diagram, np.array([0.05, 0.1]), max_step=engine.max_step)
 

@@ -29,7 +29,7 @@ FEELS = {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)}
 SMALL = {"robot.tetrahedra": 2}
 WALKS = {
     "thesis": ("thesis", SMALL, ["drake", "compiled", *(["mujoco"] if installed() else [])]),
-    "witnessed": ("thesis", SMALL | {"engine": Drake(mode_changes="witness")}, ["drake"]),
+    "witnessed": ("thesis-reversal", SMALL | {"engine": Drake(mode_changes="witness")}, ["drake"]),
     "rough": ("thesis", ROUGH, ["compiled"]),
     "feedback": ("thesis", FEELS | {"robot.tetrahedra": 3}, ["drake", "compiled"]),
     "command": ("coulomb", {}, ["compiled"]),
@@ -53,7 +53,7 @@ def test_recording_and_watching_change_nothing(walk, engine):
     if engine == "drake":
         viewer, unwatched = Mock(wants=Mock(return_value=True)), recorded
         recorded = simulate(short, **drive, record=True, viewer=viewer)
-        assert viewer.show.call_count > 50
+        assert viewer.show.call_count > 25
         xarray.testing.assert_identical(recorded.trajectory, unwatched.trajectory)
     # NaN, too, of a robot that has no front.
     assert repr(recorded.metrics) == repr(plain.metrics), "bit for bit"

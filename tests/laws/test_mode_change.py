@@ -34,8 +34,8 @@ def test_first_zero_of_a_quadratic(value, rate, rate_rate, expected):
 
 @pytest.fixture
 def reset(scenario: Scenario) -> RobotOnGround:
-    """The robot just landed."""
-    robot = RobotOnGround(scenario, np.eye(3))
+    """The robot just landed, under the reading by which nodes slip."""
+    robot = RobotOnGround(scenario.with_changes({"friction.reset": "reversal"}), np.eye(3))
     robot.update()
     return robot
 
@@ -67,6 +67,14 @@ def test_the_margin_of_a_slipping_node_is_its_speed_that_way(reset, axis, mode):
 def test_a_mode_change_is_foreseen_when_it_comes(reset, v_x, upward, expected):
     time = reset.time_to_change((v_x, 0.0, 0.0), (0.0, 0.0, upward))
     assert time == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_reset_at_the_range_is_no_mode_change(scenario):
+    robot = RobotOnGround(scenario, np.eye(3))
+    robot.update()
+    far, fast = 1.1 * scenario.friction.stiction_range, (0.05, 0.0, 0.0)
+    assert robot.margin(p=(far, 0.0, -1e-4)) > 0.0
+    assert robot.time_to_change(fast) == 9.0, "the horizon"
 
 
 # Coulomb friction, on flat ground and on a slope.

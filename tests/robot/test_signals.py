@@ -27,8 +27,9 @@ def network_output(robot: Robot, gait: Gait) -> np.ndarray:
     return signal_samples(robot, gait) / robot.scenario.cpg.gain
 
 
-def test_stepped_as_the_listing_steps_it_gives_the_listings_output(robot, listing):
+def test_stepped_as_the_listing_steps_it_gives_the_listings_output(scenario, listing):
     gait, steps, reference = listing
+    robot = Robot.of(scenario.with_changes({"cpg.signals": "listing"}))
     output = network_output(robot, gait)
     assert output.shape == (30_002, 4), "the last is held for two more samples"
     np.testing.assert_allclose(output[steps], reference, rtol=0, atol=1e-9)
@@ -37,7 +38,6 @@ def test_stepped_as_the_listing_steps_it_gives_the_listings_output(robot, listin
 def test_the_converged_network_stays_within_the_listings_own_error(scenario, listing):
     # Euler's error reaches 1.4e-2 by 15 s on gait_a. The listing stamps a state one step early.
     gait, steps, reference = listing
-    scenario = scenario.with_changes({"cpg.signals": "live"})
     error = np.abs(network_output(Robot.of(scenario), gait)[steps + 1] - reference).max(axis=1)
     assert error[steps * 0.5e-3 <= 3.0].max() < 2e-3
     assert error.max() < 2e-2

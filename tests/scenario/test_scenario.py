@@ -76,8 +76,9 @@ BAD_CHANGES: list[tuple[object, str, str]] = [
     ({"robot": {"slack": True}}, "robot.slack", "'cables.slack'"),
     ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
     ({"robot.actuation": [LEFT], "gait_bounds.mirrored": True}, "gait_bounds.mirrored", "true"),
-    (LOAD, "cpg.signals", "'listing'"),
-    (LOAD | {"cpg.signals": "live", "robot.gravity": 0.0}, "robot.gravity", "0 m/s^2"),
+    (LOAD | {"cpg.signals": "listing"}, "cpg.signals", "'listing'"),
+    (LOAD | {"robot.gravity": 0.0}, "robot.gravity", "0 m/s^2"),
+    ({"friction.breaks_free": "both"}, "friction.breaks_free", "'range'"),
     ({"cpg.listing_step": "16 s"}, "cpg.listing_step", "16.0 s"),
     ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
     ({"gait_bounds.tau_a_min": "0.6 s"}, "gait_bounds.tau_a_min", "0.6"),
@@ -126,20 +127,26 @@ def test_a_duration_is_shortened_by_one_key(name):
     shipped = load_once(name)
     for duration in (0.5, 2.0, 15.0):
         changed = shipped.with_changes({"simulation.duration": f"{duration} s"})
-        assert changed.simulation.settling_time == min(3.0, duration / 4.0)
+        given = shipped.simulation.steady_from
+        expected = min(3.0, duration / 4.0) if given is None else given
+        assert changed.simulation.settling_time == expected
         is_idle = duration <= changed.cpg.start_up and changed.policy is None
         assert ("cpg.start_up" in start_up_remark(Robot.of(changed))) == is_idle
 
 
 def test_differences_are_keys_and_readable_values(scenario):
-    changes = {"robot.cables.slack": True, "cpg.signals": "live", "optimizer.stop_rise": 0.1 + 0.2}
+    changes = {
+        "robot.cables.slack": True,
+        "cpg.signals": "listing",
+        "optimizer.stop_rise": 0.1 + 0.2,
+    }
     changes |= {"name": "other", "friction.stiction_damping": "0.3 lbf*s/in"}
     changed = scenario.with_changes(changes | {"robot.offsets": [["1 mm", 0, 0]] * 5})
     assert changed.differences(scenario) == [
         ("robot.cables.slack", "true"),
         ("robot.offsets", f"[{', '.join(['[1 mm, 0, 0]'] * 5)}]"),
         ("friction.stiction_damping", "0.3 lbf*s/in"),
-        ("cpg.signals", "live"),
+        ("cpg.signals", "listing"),
         ("optimizer.stop_rise", "0.3"),
     ]
     other = scenario.with_changes({"objective.lead": "2 /in", "terrain": "!Incline {slope: 5 deg}"})

@@ -57,8 +57,8 @@ def test_frames_are_shown_in_real_time(short, meshcat, visitor, look, slept, mon
     assert slept - 1.0 / FRAMES_PER_SECOND <= time.slept <= slept
     times = np.array([call.args[0]["time"].values[0] for call in view.show.call_args_list])
     assert times[0] == 0.0 and len(times) <= 0.3 * FRAMES_PER_SECOND + 1
-    # A frame is due every 33 ms and comes with the end of a step, which takes 8 ms at most.
-    assert np.diff(times).max() < 1.0 / FRAMES_PER_SECOND + 0.009
+    # A frame is due every 33 ms and comes with the end of a step, which takes 12 ms at most.
+    assert np.diff(times).max() < 1.0 / FRAMES_PER_SECOND + 0.013
 
 
 def test_only_this_machine_can_watch(short):

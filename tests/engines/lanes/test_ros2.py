@@ -54,6 +54,7 @@ def stepper(scenario: Scenario) -> FrozenStepper:
     soft = {"robot.cables.damping": "0.2 N*s/m", "friction.stiction_damping": "2.0 N*s/m"}
     soft["ground.damping"] = "5e3 N*s/m^2"
     soft["ground.stiffness"] = "200 N/m"  # so that the weight keeps the nodes in the ground
+    soft["friction.reset"] = "reversal"  # without the jumps of a deflection that restarts
     return FrozenStepper(scenario.with_changes(soft))
 
 
