@@ -41,17 +41,16 @@ FIXED = "!Compiled {tolerance: 1000 m/s}"
 """An engine that accepts every step of max_step."""
 
 _ONE_LBF = {"cpg.gain": "1 lbf"}
-_AT_RANGE = {
-    "friction.reset": "range",
-    "engine": "!Compiled {tolerance: 1e-3 m/s, max_step: 10 ms}",
-}
-"""Where nodes never slip, these coarser steps change a distance by 0.001 in (median of 500 random
-gaits)."""
 _NEVER = {"friction.reset": "never"}
 _SECOND_SAMPLE = {"simulation.steady_from": "0 s"}
 _OTHER_TAU = {"optimizer.tau_mutation": "listing"}
 _STIFF = {"friction.stiffness": "0.3 lbf/in", "friction.proportional_stiction": 0.0}
 _AT_ONCE = {"cpg.start_up": "0 s"}
+_PER_LOAD = {"friction.load": "1 lbf"}
+_LISTED = {
+    "cpg.signals": "listing",
+    "engine": "!Compiled {tolerance: 1e-3 m/s, max_step: 10 ms}",
+}
 
 
 Record: TypeAlias = dict[str, list[dict[str, float]]]
@@ -60,10 +59,11 @@ Record: TypeAlias = dict[str, list[dict[str, float]]]
 
 @dataclass(frozen=True)
 class Reading:
-    """A reading of the thesis's text: its changes of the scenario `thesis`."""
+    """A reading of the thesis's text: its changes of a shipped scenario."""
 
     about: str
     changes: Mapping[str, Any] = field(default_factory=dict)
+    base: str = "thesis"
     run: str = ""
     """Name of the recorded run of this reading, if there is one."""
     trials_of: str = ""
@@ -72,21 +72,14 @@ class Reading:
     """Settings of SteadyState that end them."""
 
 
-READINGS = {
-    "thesis": Reading("as we read it", run="thesis"),
-    "range": Reading("the deflection becomes 0 where the node breaks free", _AT_RANGE),
-    "never": Reading("the deflection is never reset", _NEVER),
-    "no-product": Reading("σ₀ x without the velocity in Eq. 5", _STIFF),
-    "load": Reading("friction times the normal force in lbf", {"friction.load": "1 lbf"}),
-    "both": Reading("a node breaks free along x and y at once", {"friction.breaks_free": "both"}),
+AS_WRITTEN = {
+    "thesis": Reading(
+        "as written: the deflection becomes 0 where a node breaks free", run="thesis"
+    ),
+    "listing": Reading("as the code ran: the listing's signals, τ_A and dx₁", run="thesis-listing"),
+    "listed": Reading("the listing's signals", _LISTED),
     "gain-1": Reading("signals of gain 1, as in the listing", _ONE_LBF),
-    "gain-1.5": Reading("signals of gain 1.5", {"cpg.gain": "1.5 lbf"}),
-    "at-once": Reading("signals from the start", _AT_ONCE),
-    "second-sample": Reading("dx₁ from the second sample, as in the listing", _SECOND_SAMPLE),
-    "tau": Reading("mutation never reaches τ_A, as in the listing", _OTHER_TAU, "thesis-listing"),
-    "crossover": Reading("crossover 80 %", {"optimizer.crossover_probability": 0.8}),
-    "coarse": Reading("coarse variable steps", {"engine": COARSE}),
-    "fixed": Reading("fixed steps of 3 ms", {"engine": FIXED}),
+    "load": Reading("friction times the normal force in lbf", _PER_LOAD),
     "stop-never": Reading("2000 iterations in every trial", {"optimizer.stop_rise": 0.0}),
     "early": Reading(
         "the stop counts from iteration 100", trials_of="stop-never", stop={"stop_after": 100}
@@ -94,15 +87,37 @@ READINGS = {
     "steep": Reading(
         "the stop needs a rise of 0.3", trials_of="stop-never", stop={"stop_rise": 0.3}
     ),
-    "listing": Reading(
-        "gain 1, τ_A and dx₁ as in the listing", _ONE_LBF | _SECOND_SAMPLE | _OTHER_TAU
-    ),
-    "never-gain-1": Reading("never reset, gain 1", _NEVER | _ONE_LBF),
-    "range-listing": Reading(
-        "0 where it breaks free, τ_A and dx₁ as in the listing",
-        _AT_RANGE | _SECOND_SAMPLE | _OTHER_TAU,
-    ),
+    "olsson": Reading("never reset, σ₀ x without the velocity, as Olsson", _NEVER | _STIFF),
 }
+"""The scenario `thesis`, and other readings of what does not concern slip."""
+
+_SLIPPING: Mapping[str, tuple[str, Mapping[str, Any]]] = {
+    "never": ("never reset, as Eq. 3 and 4 print", _NEVER),
+    "no-product": ("σ₀ x without the velocity in Eq. 5", _STIFF),
+    "load": ("friction times the normal force in lbf", _PER_LOAD),
+    "both": ("a node breaks free along x and y at once", {"friction.breaks_free": "both"}),
+    "gain-1": ("signals of gain 1, as in the listing", _ONE_LBF),
+    "gain-1.5": ("signals of gain 1.5", {"cpg.gain": "1.5 lbf"}),
+    "at-once": ("signals from the start", _AT_ONCE),
+    "second-sample": ("dx₁ from the second sample, as in the listing", _SECOND_SAMPLE),
+    "tau": ("mutation never reaches τ_A, as in the listing", _OTHER_TAU),
+    "crossover": ("crossover 80 %", {"optimizer.crossover_probability": 0.8}),
+    "coarse": ("coarse variable steps", {"engine": COARSE}),
+    "fixed": ("fixed steps of 3 ms", {"engine": FIXED}),
+    "stop-never": ("2000 iterations in every trial", {"optimizer.stop_rise": 0.0}),
+    "listing": ("gain 1, τ_A and dx₁ as in the listing", _ONE_LBF | _SECOND_SAMPLE | _OTHER_TAU),
+    "never-gain-1": ("never reset, gain 1", _NEVER | _ONE_LBF),
+}
+
+FORMER = {
+    "reversal": Reading("a node slips until its velocity changes sign", run="thesis-reversal")
+} | {
+    f"slip-{name}": Reading(f"slips; {about}", changes, "thesis-reversal")
+    for name, (about, changes) in _SLIPPING.items()
+}
+"""Readings under which nodes slip: the scenario `thesis-reversal` and its variants."""
+
+READINGS = AS_WRITTEN | FORMER
 
 _THREE = {"evolution.trials": 3}
 
@@ -128,7 +143,7 @@ def run_of(name: str) -> Run:
         return run_of(reading.trials_of)
     if reading.run:
         return load_run(HERE / reading.run)
-    out, base = SCRATCH / name, load_scenario("thesis").on_engine("compiled")
+    out, base = SCRATCH / name, load_scenario(reading.base).on_engine("compiled")
     return evolve(
         base.with_changes({"name": f"reading-{name}"} | dict(reading.changes)),
         out,

@@ -135,9 +135,7 @@ EXPERIMENTS = {
         "the same evolved on the Drake diagram itself",
         "thesis-reversal",
         {"evolution.trials": 1, "evolution.evaluations": 250}
-        | {
-            "engine": "!Drake {scheme: radau3, max_step: 8 ms, look_ahead: 0.00002 s}"
-        },
+        | {"engine": "!Drake {scheme: radau3, max_step: 8 ms, look_ahead: 0.00002 s}"},
     ),
     "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
     "coulomb": Experiment("the same under friction that grows with the load", "coulomb", {}),

@@ -42,7 +42,8 @@ from tetra_drake.settings.units import INCH, POUND_FORCE, plainest
 HERE = Path(__file__).parent
 PAGE, FIGURES = HERE / "thesis/THESIS.md", HERE / "thesis/redrawn"
 NUMBERS = HERE / "thesis/simulated.json"
-TEMPLATE = HERE / "thesis.md.jinja"
+TEMPLATE, SINES = HERE / "thesis.md.jinja", HERE / "thesis/sine.json"
+FORMER = HERE / "thesis-reversal"
 
 sys.path.append(str(HERE.parent / "diagrams"))
 
@@ -158,9 +159,10 @@ def ground_numbers() -> dict[str, str]:
     settling, bouncing = settling_node.settle(scenario), settling_node.bounce(scenario)
     speed, rebound = settling_node.contact_speeds(bouncing)
     alpha = settling_node.velocity_correction(scenario)
-    slips = sliding_tetrahedron.slips(
-        sliding_tetrahedron.slide(scenario), sliding_tetrahedron.LEADING
-    )
+    leading, thrown = sliding_tetrahedron.LEADING, sliding_tetrahedron.slide(scenario)
+    slipping = sliding_tetrahedron.slide(load_scenario("thesis-reversal"))
+    slips = sliding_tetrahedron.slips(slipping, leading)
+    ways = [sliding_tetrahedron.travel(motion, leading)[-1] for motion in (thrown, slipping)]
     hertz, robot = single_oscillator.linear_frequency(scenario), Robot.of(scenario)
     needed = single_oscillator.TAU_A * hertz / single_oscillator.THESIS_FREQUENCY
     return {
@@ -170,6 +172,8 @@ def ground_numbers() -> dict[str, str]:
         "linear": fixed(1.0 - alpha * speed, 3),
         "alpha": fixed(alpha * INCH),
         "aimed_alpha": fixed((1.0 - thesis) / (speed / INCH), 3),
+        "rest": fixed(ways[0] / INCH, 3),
+        "slid": fixed(ways[1] / INCH, 3),
         "slips": f"{1e3 * slips[0][0]:.1f} to {1e3 * slips[0][1]:.0f} ms",
         "hertz": fixed(hertz),
         "needed_tau": fixed(needed, 3),
@@ -224,7 +228,7 @@ def without_slip(run: Run) -> str:
 
 
 def simulated_numbers(run: Run) -> dict[str, Any]:
-    """The numbers of the page that need simulations, whose last digits depend on the processor."""
+    """The numbers of the page that need simulations, for the run in which nodes slip."""
     return {
         "ground": ground_numbers(),
         "without_slip": without_slip(run),
@@ -237,10 +241,14 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
     template = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True).from_string(
         read_text(TEMPLATE, "template")
     )
+    sines = read_json(SINES, "record; run `python runs/sine.py`")
     tables = readings.tables_of(readings.load_record(readings.RECORD))
     return template.render(
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
+        former=trials_numbers(load_run(FORMER)),
+        sines=sines,
+        sine=lambda name: fixed(sines[name]["distance_in"]),
         setting=setting,
         reached=reached,
         apart=apart,
@@ -258,7 +266,7 @@ def main() -> None:
     """Writes the page and the figures."""
     run = load_run(HERE / "thesis")
     save_figures(run, FIGURES)
-    write_whole(NUMBERS, json.dumps(simulated_numbers(run), indent=1) + "\n")
+    write_whole(NUMBERS, json.dumps(simulated_numbers(load_run(FORMER)), indent=1) + "\n")
     write_whole(PAGE, page(run, read_json(NUMBERS, "numbers")) + "\n")
 
 
