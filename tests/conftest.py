@@ -1,6 +1,8 @@
 """Fixtures of several test modules."""
 
 import contextlib
+import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -19,7 +21,13 @@ Refused = Callable[..., contextlib.AbstractContextManager[None]]
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compiles all kernels before worker processes start, as each would compile them. With `-n 0`
-    a test compiles what it calls."""
+    a test compiles what it calls.
+
+    Python keeps the bytecode of what it imports, whatever the environment says: a hundred processes
+    of tests would compile it again, for seconds each.
+    """
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     option = session.config.option
     if getattr(option, "numprocesses", 0) and not option.collectonly:
         prepare()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -25,6 +26,9 @@ EMITTERS = 4
 BATCH = 15
 """Number of vectors per emitter and iteration."""
 
+COMPILED = "_transform_and_check_sol", "_calc_cov_update"
+"""Functions of pyribs's CMA-ES that numba compiles."""
+
 SIGMA = 0.5
 """Initial standard deviation. An emitter starts at a random gait and restarts at one of the map."""
 
@@ -46,8 +50,13 @@ class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
     def __post_init__(self) -> None:
         from ribs.archives import GridArchive
         from ribs.emitters import EvolutionStrategyEmitter
+        from ribs.emitters.opt import CMAEvolutionStrategy
 
         super().__post_init__()
+        for name in COMPILED:
+            # pyribs compiles them for seconds in each process, where numba does not keep them.
+            with contextlib.suppress(AttributeError, RuntimeError):
+                getattr(CMAEvolutionStrategy, name).enable_caching()
         self._roots: Matrix = np.empty((0, self._ranges.size))
         """Roots of the points that were drawn last; see Ranges.from_roots()."""
         self._archive = GridArchive(
