@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from one_tetrahedron import make_diagram, make_standing_tetrahedron
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from tetra_drake.laws.contact import CONTACT, MODE, MODE_COLUMNS
 from tetra_drake.laws.friction import STICK
-from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario
@@ -31,7 +32,7 @@ def test_exports_what_a_user_plots(robot, gait):
     context = diagram.CreateDefaultContext()
     ports = [diagram.get_output_port(i) for i in range(diagram.num_output_ports())]
     sizes = {"state": 65, "signals": 4, "tensions": 24, "lengths": 24}
-    sizes |= {"normal_forces": 11, "friction_forces": 22, "modes": 33}
+    sizes |= {"normal_forces": 11, "friction_forces": 22, "contact_forces": 33, "modes": 33}
     assert {port.get_name(): len(port.Eval(context)) for port in ports} == sizes
 
 
@@ -84,3 +85,81 @@ def test_a_turn_beyond_its_limits_is_refused_on_the_port_as_by_a_function(turn, 
             steering.GetInputPort("turn").FixValue(context, [port])
         with refused("steering", "at 3 s", str(turn)):
             steering.get_output_port().Eval(context)
+
+
+# A ground of the user's.
+
+
+class OwnGround(LeafSystem):
+    """Springs under the origins of bodies, or nothing that a diagram could use."""
+
+    def __init__(self, bodies: int, *, force: str = "generalized_force") -> None:
+        super().__init__()
+        self.state = self.DeclareVectorInputPort("state", 13 * bodies)
+        self.DeclareVectorOutputPort(force, 6 * bodies, self.calc)
+        self.DeclareVectorOutputPort("normal_forces", 2, lambda context, output: None)
+
+    def calc(self, context: Context, output: BasicVector) -> None:
+        heights = self.state.Eval(context)[6 : 7 * (output.size() // 6) : 7]
+        force = np.zeros((len(heights), 6))
+        force[:, 5] = 100.0 * np.maximum(0.0, -heights)
+        output.SetFromVector(force.ravel())
+
+
+def test_a_ground_of_ones_own_acts_in_place_of_ours(robot, gait):
+    ground = OwnGround(5)
+    diagram = MakeTensegrityDiagram(robot, gait, ground=ground)
+    assert diagram.GetSubsystemByName("ground") is ground
+    names = {diagram.get_output_port(i).get_name() for i in range(diagram.num_output_ports())}
+    assert "normal_forces" in names and not {"modes", "contact_forces"} & names
+    simulator = Simulator(diagram)
+    state = robot.structure.initial_state
+    state[6:35:7] = -0.01  # 1 N on each body
+    context = simulator.get_mutable_context()
+    plant = diagram.GetSubsystemByName("plant")
+    plant.SetPositionsAndVelocities(plant.GetMyMutableContextFromRoot(context), state)
+    rates = diagram.EvalTimeDerivatives(context).get_generalized_velocity().CopyToVector()
+    fallen = MakeTensegrityDiagram(robot, gait, ground=OwnGround(5))
+    falls = fallen.CreateDefaultContext()
+    state[6:35:7] = 1.0
+    plant = fallen.GetSubsystemByName("plant")
+    plant.SetPositionsAndVelocities(plant.GetMyMutableContextFromRoot(falls), state)
+    without = fallen.EvalTimeDerivatives(falls).get_generalized_velocity().CopyToVector()
+    pushed = (rates - without).reshape(5, 6) * robot.structure.mass[:, np.newaxis]
+    np.testing.assert_allclose(pushed, [[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * 5, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("ground", "options", "key", "fact"),
+    [
+        (OwnGround(4), {}, "ground", "52"),
+        (OwnGround(5, force="force"), {}, "ground", "'generalized_force'"),
+        (OwnGround(5), {"modes": np.zeros((11, MODE_COLUMNS))}, "modes", "`ground`"),
+    ],
+)
+def test_a_ground_without_the_ports_is_refused(robot, gait, refused, ground, options, key, fact):
+    with refused("MakeTensegrityDiagram", key, fact):
+        MakeTensegrityDiagram(robot, gait, ground=ground, **options)
+
+
+def test_feedback_needs_a_ground_with_modes(scenario, refused):
+    senses = scenario.with_changes({"cpg.feedback": ["load"]})
+    with refused("MakeTensegrityDiagram", "ground", "'mode_table'"):
+        MakeTensegrityDiagram(Robot.of(senses), seeded_gait(senses), ground=OwnGround(5))
+
+
+@pytest.mark.parametrize("terrain", ["!Flat", "!Incline {slope: 20 deg}"])
+def test_contact_forces_are_the_forces_on_the_bodies_in_the_world(scenario, gait, terrain):
+    robot = Robot.of(scenario.with_changes({"terrain": terrain, "robot.contacts": "all"}))
+    diagram = MakeTensegrityDiagram(robot, gait)
+    simulator = Simulator(diagram)
+    simulator.AdvanceTo(0.05)
+    ground = diagram.GetSubsystemByName("ground")
+    context = ground.GetMyContextFromRoot(simulator.get_context())
+    forces = ground.GetOutputPort("contact_forces").Eval(context).reshape(-1, 3)
+    on_bodies = ground.GetOutputPort("generalized_force").Eval(context).reshape(5, 6)[:, 3:]
+    assert np.abs(forces).max() > 0.0
+    np.testing.assert_allclose(forces.sum(axis=0), on_bodies.sum(axis=0), rtol=1e-12)
+    upright = terrain == "!Flat"
+    normal = ground.GetOutputPort("normal_forces").Eval(context)
+    assert np.allclose(forces[:, 2], normal, rtol=1e-12) == upright

@@ -54,7 +54,7 @@ from tetra_drake.robot.structure import with_origins
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import GivenScenario, given_scenario
-from tetra_drake.systems import HeldSignals
+from tetra_drake.systems import GroundContact, HeldSignals
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 _WITNESS_WINDOW = 2e-5  # s; precision of witnessed mode changes for accuracies of 1e-3 and above
@@ -128,7 +128,7 @@ class _DiagramRobot(LoneRobot):
         self._simulator = _make_simulator(diagram, self._steps)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
         self._observer = Observer(driven)
-        self._work = _Work(self._simulator.get_integrator())
+        self._work = _Work(self._simulator)
         self._aimer = _StepAimer(diagram, self._simulator, self._steps, self._work)
         times = motion_times(robot.scenario.simulation, record=record)
         self._sampler = Sampler(diagram, times, max_step=self._steps.max_step)
@@ -290,8 +290,16 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     least 2e-5 and at most 5e-3, or 1e-2 where nodes never slip. The damping ratio c / (2 sqrt(k m))
     is for the cable's damping c and stiffness k, and the reduced mass m of the two bodies that it
     joins. For a structure without elastic cables it is 2e-5.
+
+    The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
+    monitor replaces it.
     """
-    return _make_simulator(diagram, _Steps.of(robot, settings))
+    steps = _Steps.of(robot, settings)
+    simulator = _make_simulator(diagram, steps)
+    aimer = _StepAimer(diagram, simulator, steps, _Work(simulator))
+    state, bodies = diagram.GetOutputPort("state"), len(robot.structure.bodies)
+    simulator.set_monitor(lambda now: aimer.aim(now, state.Eval(now)[7 * bodies :]))
+    return simulator
 
 
 def _make_simulator(diagram: Diagram, steps: _Steps) -> Simulator:
@@ -418,10 +426,15 @@ class _Work:
     put into `before` first.
     """
 
-    def __init__(self, integrator: IntegratorBase) -> None:
-        self._integrator = integrator
+    def __init__(self, simulator: Simulator) -> None:
+        # A reference to the simulator or its integrator in its monitor would keep it for ever.
+        self._simulator = weakref.ref(simulator)
         self.before = IntegratorWork(scheme="", accuracy=0.0, steps=0, derivative_evaluations=0)
         """Work before the integrator was initialised for the last time."""
+
+    @property
+    def _integrator(self) -> IntegratorBase:
+        return _integrator_of(self._simulator)
 
     def total(self, scheme: str = "", accuracy: float = 0.0) -> IntegratorWork:
         before, statistics = self.before, dict(self._integrator.GetStatisticsSummary())
@@ -437,6 +450,12 @@ class _Work:
     def evaluations(self) -> int:
         earlier = self.before.derivative_evaluations
         return earlier + self._integrator.get_num_derivative_evaluations()
+
+
+def _integrator_of(simulator: weakref.ref[Simulator]) -> IntegratorBase:
+    alive = simulator()
+    assert alive is not None
+    return alive.get_mutable_integrator()
 
 
 class _StepAimer:
@@ -464,14 +483,13 @@ class _StepAimer:
     """
 
     def __init__(self, diagram: Diagram, simulator: Simulator, steps: _Steps, work: _Work) -> None:
-        self._integrator, self._steps = simulator.get_mutable_integrator(), steps
-        self._work = work
+        self._simulator, self._steps, self._work = weakref.ref(simulator), steps, work
         self._ground = diagram.GetSubsystemByName("ground")
-        self._ground_context = self._ground.GetMyContextFromRoot(simulator.get_mutable_context())
         self._aims = (
             steps.at_step_end
             and steps.look_ahead > 0.0
             and steps.scheme == "radau3"  # other schemes take short steps anyway
+            and isinstance(self._ground, GroundContact)
         )
         touches = diagram.HasSubsystemNamed("state_forces")
         self._struts = diagram.GetSubsystemByName("state_forces") if touches else None
@@ -480,6 +498,10 @@ class _StepAimer:
         self._last_velocities = self._acceleration = np.zeros(size)
         self._longest = steps.max_step
         self._jacobian_is_old = False
+
+    @property
+    def _integrator(self) -> IntegratorBase:
+        return _integrator_of(self._simulator)
 
     def numbers(self) -> np.ndarray:
         """The state of the aimer as one array, for restore()."""
@@ -512,7 +534,9 @@ class _StepAimer:
 
         look_ahead, pace = self._steps.look_ahead, self._steps.pace
         due, time_to_change = self._ground.NextModeChange(
-            self._ground_context, acceleration=self._acceleration, horizon=self._steps.max_step
+            self._ground.GetMyContextFromRoot(context),
+            acceleration=self._acceleration,
+            horizon=self._steps.max_step,
         )
         if due:
             self._longest, self._jacobian_is_old = pace.first_step, True

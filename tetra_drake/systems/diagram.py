@@ -44,6 +44,7 @@ def MakeTensegrityDiagram(
     *,
     steering: SteeringSignal | None = None,
     controller: System | None = None,
+    ground: System | None = None,
     scene_graph: bool = False,
     meshcat: Meshcat | None = None,
     parameters: bool = False,
@@ -79,6 +80,9 @@ def MakeTensegrityDiagram(
       others. Its input ports `state` and those named like an output port of cables or ground, such
       as `lengths`, `rates`, `tensions` and `normal_forces`, are connected to these. All others are
       input ports of the diagram. See SampledController and robot.command.controlled_robot().
+    - ground: a GroundContact; or the system given as `ground`, with the input port `state` (13*n,)
+      and the output port `generalized_force` (6*n,) of the n bodies, as GroundContact has them, and
+      whichever of its other ports
     - scene_graph: with `scene_graph` or `meshcat`; it has struts, spheres and cables. During a
       simulation it is shown in `meshcat`, where bodies can be dragged with the mouse while Ctrl is
       held, if Drake has MeshcatMouseSpring; pages and films are made from trajectories.
@@ -89,8 +93,8 @@ def MakeTensegrityDiagram(
     controller, one for each of the structure's m `oscillators`; ports of the controller. Output
     ports, with their subsystems in parentheses: state (plant), signals (start_up, controller or
     signals), drives (cables_actuators), tensions and lengths (cables), normal_forces,
-    friction_forces and modes (ground), query_object (scene_graph). The classes Steering,
-    CableNetwork and GroundContact have their shapes and units.
+    friction_forces, contact_forces and modes (ground), query_object (scene_graph). The classes
+    Steering, CableNetwork and GroundContact have their shapes and units.
 
     With `parameters`, one diagram serves many robots that differ in constants of cables and ground,
     which are parameters of the context then; see CableNetwork.SetLaw() and
@@ -105,12 +109,14 @@ def MakeTensegrityDiagram(
     discrete state, as Drake's Linearize and DirectCollocation need it. So it is right near a state
     only: a node that sticks there keeps its friction where it lifts off.
 
-    Raises InputError if a gait is not of this robot, or a port of the controller has another size.
+    Raises InputError if a gait is not of this robot, a port of the controller or of the ground is
+    missing or has another size, or `ground` is given with `modes`.
     """
     source = "MakeTensegrityDiagram"
     check_type(source, "robot", robot, Robot)
     check_type(source, "gait", gait, *get_args(AnyGait), NoneType)
     check_type(source, "controller", controller, System, NoneType)
+    check_type(source, "ground", ground, System, NoneType)
     check_type(source, "scene_graph", scene_graph, bool)
     check_type(source, "meshcat", meshcat, Meshcat, NoneType)
     scenario, structure = robot.scenario, robot.structure
@@ -141,16 +147,20 @@ def MakeTensegrityDiagram(
         scene_graph=scene,
         parameters=parameters,
     )
-    ground = AddGroundContact(
-        builder,
-        plant,
-        frames=[nodes[node] for node in structure.contacts],
-        ground=robot.ground,
-        radius=robot.ground.radius.tolist(),
-        witness=isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness",
-        parameters=parameters,
-        modes=modes,
-    )
+    if ground is None:
+        ground = AddGroundContact(
+            builder,
+            plant,
+            frames=[nodes[node] for node in structure.contacts],
+            ground=robot.ground,
+            radius=robot.ground.radius.tolist(),
+            witness=isinstance(scenario.engine, Drake)
+            and scenario.engine.mode_changes == "witness",
+            parameters=parameters,
+            modes=modes,
+        )
+    else:
+        _AddGround(builder, plant, ground, robot, has_modes=modes is not None)
     model = robot.model
     held = model.anchors.nodes.size or model.joints.node_a.size or model.loads.nodes.size
     if model.strut_contact.acts or held:
@@ -174,8 +184,9 @@ def MakeTensegrityDiagram(
     builder.ExportOutput(signals, "signals")
     for name in ("tensions", "lengths"):
         builder.ExportOutput(cables.GetOutputPort(name), name)
-    for name in ("normal_forces", "friction_forces", "modes"):
-        builder.ExportOutput(ground.GetOutputPort(name), name)
+    for name in ("normal_forces", "friction_forces", "contact_forces", "modes"):
+        if ground.HasOutputPort(name):
+            builder.ExportOutput(ground.GetOutputPort(name), name)
     if scene is not None:
         builder.ExportOutput(scene.get_query_output_port(), "query_object")
     diagram = builder.Build()
@@ -227,6 +238,26 @@ def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
             zip(structure.cable_names, structure.cable_ends, strict=True)
         )
     ]
+
+
+def _AddGround(
+    builder: DiagramBuilder, plant: MultibodyPlant, ground: System, robot: Robot, *, has_modes: bool
+) -> None:
+    """Adds a user's system `ground` to the diagram. Raises InputError if a port is missing or has
+    another size, or the diagram needs what only a GroundContact has."""
+    source, bodies = "MakeTensegrityDiagram", len(robot.structure.bodies)
+    if has_modes:
+        raise InputError(source, "modes", "found some, but `ground` has no modes to hold")
+    if not ground.HasInputPort("state") or not ground.HasOutputPort("generalized_force"):
+        problem = "expected an input port 'state' and an output port 'generalized_force'"
+        raise InputError(source, "ground", problem)
+    if robot.scenario.cpg.feedback and not ground.HasOutputPort("mode_table"):
+        raise InputError(
+            source, "ground", "expected an output port 'mode_table' for `cpg.feedback`"
+        )
+    _check_size(ground.GetInputPort("state"), 13 * bodies, key="ground")
+    _check_size(ground.GetOutputPort("generalized_force"), 6 * bodies, key="ground")
+    Attach(builder, plant, builder.AddNamedSystem("ground", ground))
 
 
 def _AddFeedback(
@@ -283,10 +314,10 @@ def _AddController(
     return signals
 
 
-def _check_size(port: InputPort | OutputPort, size: int) -> None:
+def _check_size(port: InputPort | OutputPort, size: int, *, key: str = "controller") -> None:
     if port.size() != size:
         problem = f"found size {port.size()} of port '{port.get_name()}', expected {size}"
-        raise InputError("MakeTensegrityDiagram", "controller", problem)
+        raise InputError("MakeTensegrityDiagram", key, problem)
 
 
 def _AddSignals(

@@ -25,6 +25,7 @@ from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import contact
 from tetra_drake.laws.forces import Forces, Parts, compute_ground_forces
+from tetra_drake.laws.kinematics import FORCE
 from tetra_drake.laws.mode_change import mode_margin, modes_after_step, next_mode_change
 from tetra_drake.laws.model import Model
 from tetra_drake.systems.attachment import (
@@ -49,6 +50,7 @@ class GroundContact(ConvertibleSystem):
     | generalized_force | out    | (6*n,)  | N m, N | [t_W; f_W] at each body's origin             |
     | normal_forces     | out    | (m,)    | N      | along the ground's normal, never negative    |
     | friction_forces   | out    | (2*m,)  | N      | per node: along the tangents t1 and t2       |
+    | contact_forces    | out    | (3*m,)  | N      | per node: the whole force, in the world      |
     | modes             | out    | (3*m,)  | 1      | per node: 1 if it touches, otherwise 0; then |
     |                   |        |         |        | its direction of slip along t1 and t2, which |
     |                   |        |         |        | is 0 and 0 if it sticks                      |
@@ -126,6 +128,7 @@ class GroundContact(ConvertibleSystem):
         n, point = contact.NORMAL, contact.STICK_POINT
         DeclareOutput(self, "normal_forces", count, lambda s, c: forces(s, c)[:, n], sources)
         DeclareOutput(self, "friction_forces", 2 * count, lambda s, c: forces(s, c)[:, :n], sources)
+        DeclareOutput(self, "contact_forces", 3 * count, GroundContact._forces_in_world, sources)
         DeclareOutput(self, "modes", 3 * count, lambda s, c: rows(s, c)[:, :point], discrete)
         DeclareOutput(self, "mode_table", table.size, rows, discrete)
         DeclareOutput(self, "ground_forces", 3 * count, forces, sources)
@@ -205,6 +208,11 @@ class GroundContact(ConvertibleSystem):
         written = self._force if force is None else force
         self._compute_forces(self._parts_in(context), state, modes, written)
         return self._forces.ground_forces
+
+    def _forces_in_world(self, context: Context) -> np.ndarray:
+        """Forces f_N_W (contacts, 3) of the ground on the contact nodes in N."""
+        self._table(context)
+        return self._forces.nodes[self._ground.contacts, FORCE : FORCE + 3]
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._table(context, output.get_mutable_value())

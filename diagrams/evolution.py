@@ -1,0 +1,50 @@
+"""The experiment on one screen: an evolutionary search that builds a Drake diagram per candidate.
+
+    python diagrams/evolution.py [EVALUATIONS]
+
+A candidate is a vector: weights and time constants of the oscillators. evolution.html shows the
+best one. `tetra-drake evolve` does the same in several processes, with a record.
+"""
+
+import sys
+
+import numpy as np
+from block_diagram import OUT
+
+import tetra_drake as td
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.optimizers import optimizer_of
+from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.robot.gait import AnyGait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+SCENARIO, X = td.load_scenario("quick"), 4
+"""X is the place of the rear tetrahedron's x (m) in the state [q; v], after its quaternion."""
+
+
+def distance(robot: Robot, gait: AnyGait) -> float:
+    """Way (m) of a gait: cables, ground and MatsuokaCpg around a plant, with error control."""
+    diagram = MakeTensegrityDiagram(robot, gait)
+    simulator = MakeSimulator(diagram, robot, Drake())
+    state, context = diagram.GetOutputPort("state"), simulator.get_context()
+    simulator.AdvanceTo(SCENARIO.simulation.duration)
+    return float(state.Eval(context)[X] - robot.structure.initial_state[X])
+
+
+def main(evaluations: int = 28) -> None:
+    """Searches, prints each generation and writes the page."""
+    robot, space, ways = Robot.of(SCENARIO), td.ParameterSpace.of(SCENARIO), dict[float, AnyGait]()
+    search = optimizer_of(SCENARIO.optimizer)(space, SCENARIO.evolution, np.random.default_rng(0))
+    while len(ways) < evaluations:
+        gaits = [space.gait(vector, name="evolved") for vector in search.ask()]
+        found = [distance(robot, gait) for gait in gaits]
+        search.tell([Evaluation(fitness=way) for way in found])
+        ways |= zip(found, gaits, strict=True)
+        print(f"{len(ways)} gaits, the best {max(ways):.3f} m", flush=True)
+    td.simulate(SCENARIO, ways[max(ways)], record=True).save_replay(OUT / "evolution.html")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
