@@ -35,15 +35,15 @@ def distance(robot: Robot, gait: AnyGait) -> float:
 
 def main(evaluations: int = 28) -> None:
     """Searches, prints each generation and writes the page."""
-    robot, space, ways = Robot.of(SCENARIO), td.ParameterSpace.of(SCENARIO), dict[float, AnyGait]()
+    robot, space, gaits, ways = Robot.of(SCENARIO), td.ParameterSpace.of(SCENARIO), [], []
     search = optimizer_of(SCENARIO.optimizer)(space, SCENARIO.evolution, np.random.default_rng(0))
     while len(ways) < evaluations:
-        gaits = [space.gait(vector, name="evolved") for vector in search.ask()]
-        found = [distance(robot, gait) for gait in gaits]
+        asked = [space.gait(vector, name="evolved") for vector in search.ask()]
+        found = [distance(robot, gait) for gait in asked]
         search.tell([Evaluation(fitness=way) for way in found])
-        ways |= zip(found, gaits, strict=True)
+        gaits, ways = gaits + asked, ways + found
         print(f"{len(ways)} gaits, the best {max(ways):.3f} m", flush=True)
-    td.simulate(SCENARIO, ways[max(ways)], record=True).save_replay(OUT / "evolution.html")
+    td.simulate(SCENARIO, gaits[ways.index(max(ways))], record=True).save_replay(OUT / "evolution.html")
 
 
 if __name__ == "__main__":

@@ -8,11 +8,12 @@
                            │      ↑                       │
                            └──────┴───────────────────────┘
 
-cpg       the signals of the central pattern generator, computed beforehand (it has no feedback)
-start_up  zeros until 1.25 s, then the signals
-cables    the tension of 24 cables, from their length, its rate, and the signals
-ground    normal force and friction at 11 nodes; contact and stiction are discrete state
-plant     five tetrahedra, free bodies without joints and without contact geometry
+cpg       MatsuokaCpg: four oscillators, whose neurons are continuous state
+start_up  StartUpGate: zeros until 1.25 s, then the signals
+cables    CableNetwork: the tension of 24 cables, from their length, its rate, and the signals
+ground    GroundContact: normal force and friction at 11 nodes; contact and stiction are discrete
+          state
+plant     MultibodyPlant: five tetrahedra, free bodies without joints and contact geometry
 
 The wiring is tetra_drake/systems/diagram.py. Writes robot.svg, the block diagram, and robot.html,
 the page. `tetra-drake simulate` takes longer steps. They end at predicted mode changes, where a
@@ -28,6 +29,7 @@ from block_diagram import OUT, save_block_diagram
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.engines.sampler import Sampler
+from tetra_drake.evolution.run import load_run
 from tetra_drake.results.trajectory import make_dataset, sample_times
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.measures import distance_walked
@@ -36,14 +38,14 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 from tetra_drake.visualization.replay import save_replay
 
-DIAGRAMS = Path(__file__).parent
-BEST_GAIT = DIAGRAMS.parent / "runs" / "thesis" / "trial_05" / "best_gait.json"
+RUN = Path(__file__).parents[1] / "runs" / "thesis"
+"""A run whose best gait is the default."""
 
 
-def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = OUT) -> None:
+def main(gait_file: Path | None = None, *, duration: float = 15.0, out: Path = OUT) -> None:
     """Simulates the beginning of a gait and writes the pictures."""
     scenario = load_scenario("thesis")
-    gait = load_gait(gait_file, scenario)
+    gait = load_run(RUN).best_gait() if gait_file is None else load_gait(gait_file, scenario)
     robot = Robot.of(scenario)
     diagram = MakeTensegrityDiagram(robot, gait)
     save_block_diagram(diagram, out / "robot.svg")
@@ -65,5 +67,5 @@ def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = OUT
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("gait_file", nargs="?", type=Path, default=BEST_GAIT)
+    parser.add_argument("gait_file", nargs="?", type=Path)
     main(parser.parse_args().gait_file)

@@ -24,10 +24,11 @@ import jinja2
 import numpy as np
 from analyse import MUJOCO, SHOWN, SPEED, TIGHT, TURNED, Analysis, load_analysis
 from PIL import Image
-from record import DIAGRAM, EXPERIMENTS, FILM, PICTURE, load_times
+from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, uncertain
 from tetra_drake.laws.friction import Coulomb
@@ -49,25 +50,6 @@ HEIGHT = 96
 """Height of pictures in the gallery's table, in pixels."""
 
 ENGINES = ("compiled", "diagram", "MuJoCo")
-
-FILMS = {
-    "rolling": "a rover of six struts",
-    "champion": "the thesis's robot",
-    "motors": "the same with motors on board",
-}
-"""Runs whose films are at the top of README.md, with what moves."""
-
-SMALL_FILMS = {
-    "prism": "prism",
-    "mast": "mast",
-    "six-bar": "six-bar",
-    "turning": "turning on the spot",
-    "twelve": "twelve tetrahedra",
-}
-"""Runs whose films are in the second row."""
-
-ROW = 867
-"""Width of a row of films, in pixels."""
 
 MEASURED = {
     "simplex": "a simplex of 2 m: heights under load",
@@ -241,17 +223,32 @@ def trust_table(runs: Runs) -> str:
     return TextTable(headings, rows).markdown()
 
 
-def films(names: Mapping[str, str], runs: Runs, *, distances: bool) -> str:
-    """Markdown table with a row of films for README.md, and captions that say what moves. With
-    `distances` the captions have the distances of the best gaits."""
-    width, pictures, captions = ROW // len(names), [], []
-    for name, words in names.items():
-        folder = f"{HERE.name}/{name}"
-        pictures.append(f'<img src="{folder}/{FILM}" width="{width}" alt="{words}">')
-        far = f": {best_gait(name, runs[name]).text('compiled', 1)}" if distances else ""
-        captions.append(f"[{words}]({folder}/{README}){far}")
-    lines = [pictures, [":-:" for _ in names], captions]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+def results_table(runs: Runs) -> str:
+    """Table of the thesis's results and ours, for README.md."""
+    names = ("thesis", "thesis-listing")
+    columns = []
+    for name in names:
+        run, best = load_run(HERE / name), best_gait(name, runs[name])
+        initial, evolved = run.initial(), run.best()["distance_in"]
+        columns.append(
+            [
+                fixed(initial.groupby("trial")["distance_in"].max().max()),
+                f"{100.0 * (initial['distance'] < 0.0).mean():.0f} %",
+                best.text("compiled"),
+                best.text("diagram"),
+                fixed(evolved.mean()),
+            ]
+        )
+    labels = {
+        "best gait of ten initial populations": "6.6",
+        "initial gaits that walk backward": "nearly half",
+        "best evolved gait": "14.34",
+        "the same on the Drake diagram": "",
+        "best evolved gait, mean of ten trials": "",
+    }
+    rows = [[*row, *cells] for row, *cells in zip(labels.items(), *columns, strict=True)]
+    headings = [f"[`{name}`]({HERE.name}/{name}/{README})" for name in names]
+    return TextTable(["distance in 15 s, inches", "thesis", *headings], rows).markdown()
 
 
 def gallery_page(runs: Runs) -> str:
@@ -304,8 +301,7 @@ def made_again(page: Path, runs: Runs) -> str:
 
     def make_table(name: str) -> str:
         tables = {
-            "films": lambda: films(FILMS, runs, distances=True),
-            "small-films": lambda: films(SMALL_FILMS, runs, distances=False),
+            "results": lambda: results_table(runs),
             "gallery": lambda: gallery_table(runs),
             "trust": lambda: trust_table(runs),
             "trials": lambda: trials_table(page.parent.name, runs),

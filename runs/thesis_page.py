@@ -228,7 +228,7 @@ def without_slip(run: Run) -> str:
 
 
 def simulated_numbers(run: Run) -> dict[str, Any]:
-    """The numbers of the page that need simulations, for the run in which nodes slip."""
+    """The numbers of the page that need simulations, of the run with slipping nodes."""
     return {
         "ground": ground_numbers(),
         "without_slip": without_slip(run),

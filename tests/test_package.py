@@ -76,15 +76,17 @@ def test_links_and_pictures_survive_on_an_index_of_packages(readme):
     address = "https://code.example/someone/tetra_drake"
     text = readme.for_index(read("README.md"), address, "1.2.3")
     assert all(target.startswith("https://") for target in targets(text))
-    assert f'<img src="{address}/raw/v1.2.3/runs/rolling/walking.gif" width="289" alt="' in text
-    assert f"]({address}/blob/v1.2.3/tetra_drake/scenario/README.md#events)" in text
+    assert f'<img src="{address}/raw/v1.2.3/runs/champion/walking.gif" width="430" alt="' in text
+    assert (
+        f"]({address}/blob/v1.2.3/tetra_drake/scenario/README.md#a-structure-of-your-own)" in text
+    )
     assert len(targets(text)) == len(targets(read("README.md")))
 
 
 def test_without_an_address_nothing_is_broken(readme):
     text = readme.for_index(read("README.md"), None, "1.2.3")
     assert all(target.startswith("https://") for target in targets(text))
-    assert "a rover of six struts" in text and "<img" not in text
+    assert "the thesis's robot walking" in text and "<img" not in text
 
 
 def test_the_address_is_the_given_one_or_the_workflows(readme, monkeypatch):

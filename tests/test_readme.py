@@ -19,6 +19,7 @@ from tetra_drake.cli import main, make_parser
 from tetra_drake.robot.robot import equilibrium_of
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.study.measurements import load_fit_file
+from tetra_drake.systems import MatsuokaCpg
 
 CHECKOUT = Path(__file__).parents[1]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
@@ -102,9 +103,27 @@ def shortened(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_python_runs(work: Path, shortened: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
-    (snippet,) = snippets("python")
-    exec(compile(snippet, "README.md", "exec"), {})
+    page = (CHECKOUT / "diagrams/tasks.md").read_text(encoding="utf-8")
+    (snippet,) = snippets("python", page)
+    exec(compile(snippet, "tasks.md", "exec"), {})
     assert len(td.load_run("runs/python").evaluations) == 60
+
+
+def test_a_search_builds_a_diagram_per_candidate(monkeypatch: pytest.MonkeyPatch) -> None:
+    load = td.load_scenario
+    brief = {"simulation.duration": "0.05 s", "optimizer.population": 5}
+    monkeypatch.setattr(td, "load_scenario", lambda n: load(n).with_changes(brief), raising=False)
+    (snippet,) = snippets("python")
+    names = dict[str, Any]()
+    exec(compile(snippet, "README.md", "exec"), names)
+    cpg = names["diagram"].GetSubsystemByName("cpg")
+    assert isinstance(cpg, MatsuokaCpg)
+    assert len(names["found"]) == 2 and np.isfinite([one.fitness for one in names["found"]]).all()
+
+
+def test_the_front_page_is_short() -> None:
+    assert len(README.split()) <= 800
+    assert len(README.split("## Install and run")[0].split()) <= 300
 
 
 def run_in_python(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 import entrainment
+import evolution
 import pytest
 import robot
 import settling_node
@@ -44,7 +45,20 @@ def test_a_script_writes_its_pictures(script, options, files, tmp_path, monkeypa
     script.main(out=tmp_path, **options)
     written = {path.name for path in tmp_path.iterdir() if path.stat().st_size > 1000}
     assert len(written) == files
-    assert written - {"robot.html"} <= {path.name for path in robot.DIAGRAMS.glob("*.svg")}
+    assert written - {"robot.html"} <= {
+        path.name for path in Path(robot.__file__).parent.glob("*.svg")
+    }
+
+
+def test_the_loop_on_one_screen_ends_with_a_replay(tmp_path, monkeypatch, capsys):
+    brief = {"simulation.duration": "0.05 s", "optimizer.population": 5}
+    monkeypatch.setattr(evolution, "SCENARIO", evolution.SCENARIO.with_changes(brief))
+    monkeypatch.setattr(evolution, "OUT", tmp_path)
+    evolution.main(6)
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["5", "7"]
+    assert (tmp_path / "evolution.html").is_file()
+    code = Path(evolution.__file__).read_text(encoding="utf-8")
+    assert len(code.splitlines()) <= 50
 
 
 def test_signals_and_bodies_are_shown_live():
@@ -79,7 +93,7 @@ def test_what_a_tutorial_imports_is_there_and_so_is_its_picture(name):
             assert hasattr(tetra_drake, node.attr), node.attr
 
 
-SLOW = ("05", "06", "07", "09", "10", "11", "15", "16", "17", "22", "23")
+SLOW = ("05", "06", "07", "09", "10", "11", "15", "16", "17", "22", "23", "24")
 
 
 @pytest.mark.parametrize(
