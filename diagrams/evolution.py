@@ -2,8 +2,7 @@
 
     python diagrams/evolution.py [EVALUATIONS]
 
-A candidate is a vector: weights and time constants of the oscillators. evolution.html shows the
-best one. `tetra-drake evolve` does the same in several processes, with a record.
+A candidate is a vector: weights and time constants. evolution.html shows the best one walking.
 """
 
 import sys
@@ -20,22 +19,22 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
-SCENARIO, X = td.load_scenario("quick"), 4
-"""X is the place of the rear tetrahedron's x (m) in the state [q; v], after its quaternion."""
+SCENARIO, X = td.load_scenario("quick"), 4  # the rear tetrahedron's x in the state [q; v]
 
 
 def distance(robot: Robot, gait: AnyGait) -> float:
     """Way (m) of a gait: cables, ground and MatsuokaCpg around a plant, with error control."""
     diagram = MakeTensegrityDiagram(robot, gait)
     simulator = MakeSimulator(diagram, robot, Drake())
-    state, context = diagram.GetOutputPort("state"), simulator.get_context()
     simulator.AdvanceTo(SCENARIO.simulation.duration)
-    return float(state.Eval(context)[X] - robot.structure.initial_state[X])
+    state = diagram.GetOutputPort("state").Eval(simulator.get_context())
+    return float(state[X] - robot.structure.initial_state[X])
 
 
 def main(evaluations: int = 28) -> None:
     """Searches, prints each generation and writes the page."""
-    robot, space, gaits, ways = Robot.of(SCENARIO), td.ParameterSpace.of(SCENARIO), [], []
+    robot, space = Robot.of(SCENARIO), td.ParameterSpace.of(SCENARIO)
+    gaits, ways = list[AnyGait](), list[float]()
     search = optimizer_of(SCENARIO.optimizer)(space, SCENARIO.evolution, np.random.default_rng(0))
     while len(ways) < evaluations:
         asked = [space.gait(vector, name="evolved") for vector in search.ask()]
@@ -43,7 +42,8 @@ def main(evaluations: int = 28) -> None:
         search.tell([Evaluation(fitness=way) for way in found])
         gaits, ways = gaits + asked, ways + found
         print(f"{len(ways)} gaits, the best {max(ways):.3f} m", flush=True)
-    td.simulate(SCENARIO, gaits[ways.index(max(ways))], record=True).save_replay(OUT / "evolution.html")
+    best = gaits[ways.index(max(ways))]
+    td.simulate(SCENARIO, best, record=True).save_replay(OUT / "evolution.html")
 
 
 if __name__ == "__main__":
