@@ -78,6 +78,7 @@ def test_a_function_that_numba_cannot_compile_is_one_line_with_its_place():
 
 def test_a_changed_law_of_a_plugin_is_compiled_anew(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # files change within a second
     package = tmp_path / "oily"
     package.mkdir()
     (package / "__init__.py").write_text("")
