@@ -129,6 +129,8 @@ def responses(trajectory: xarray.Dataset, period: float) -> dict[str, Any]:
     for oscillator in trajectory.oscillator.values:
         cable = trajectory.sel(cable=f"{oscillator} outer bottom_left", oscillator=oscillator)
         signal, tension = cable.signal.values, cable.tension.values
+        if not np.ptp(signal) > 0.0:
+            continue  # the others silence this oscillator
         row = {"ratio": 100.0 * tension.std() / signal.std()}
         effects = {"late": tension, "yields": signal - tension, "shortens": -cable.length.values}
         for name, effect in effects.items():
@@ -209,7 +211,7 @@ def by_friction(coulomb: Run, factor: int) -> dict[str, Any]:
 def columns(rows: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
     """Lists of the numbers of several gaits, by name. Empty gaits are left out."""
     full = [row for row in rows if row]
-    return {name: np.array([row[name] for row in full]).tolist() for name in full[0]}
+    return {name: [np.asarray(row[name]).tolist() for row in full] for name in full[0]}
 
 
 def make_record() -> dict[str, Any]:
@@ -259,13 +261,19 @@ def verdict(met: np.ndarray) -> str:
     return f"{words} ({met.sum()} of {met.size})"
 
 
+def _as_array(values: list[Any]) -> np.ndarray:
+    """Numbers of the gaits (gaits, ...); in one row if gaits have different counts of them."""
+    counts = {len(value) for value in values if isinstance(value, list)}
+    return np.concatenate(values) if len(counts) > 1 else np.array(values)
+
+
 def claims(record: Mapping[str, Any]) -> TextTable:
     """Table of the claims: criterion for a case, result as median and range, and verdict.
 
     The template has a line for each claim, so that a criterion in words stands beside its formula.
     """
     numbers = {
-        part: {name: np.array(values) for name, values in record[part].items()}
+        part: {name: _as_array(values) for name, values in record[part].items()}
         for part in ("best", "initial", "friction")
     }
     alike, *directional = numbers["friction"]["evolved"]
