@@ -234,8 +234,8 @@ def results_table(runs: Runs) -> str:
             [
                 fixed(initial.groupby("trial")["distance_in"].max().max()),
                 f"{100.0 * (initial['distance'] < 0.0).mean():.0f} %",
-                best.text("compiled"),
-                best.text("diagram"),
+                best.text("compiled").removesuffix(" in"),
+                best.text("diagram").removesuffix(" in"),
                 fixed(evolved.mean()),
             ]
         )
