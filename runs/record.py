@@ -140,9 +140,9 @@ EXPERIMENTS = {
     ),
     "thesis-drake": Experiment(
         "the same evolved on the Drake diagram itself",
-        "thesis-reversal",
-        {"evolution.trials": 1, "evolution.evaluations": 250}
-        | {"engine": "!Drake {scheme: radau3, max_step: 8 ms, look_ahead: 0.00002 s}"},
+        "thesis",
+        {"evolution.trials": 1, "evolution.evaluations": 250, "engine.scheme": "radau3"},
+        engine="drake",
     ),
     "cma-es": Experiment(
         "the same by CMA-ES, where nodes slip", "thesis", _by(CmaEs(), 10, 4000) | _SLIPPING
