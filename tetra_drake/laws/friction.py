@@ -257,7 +257,7 @@ class ResetIntegrator(FrictionKind):
 
     @property
     def text(self) -> str:
-        return "the thesis's friction"
+        return f"the thesis's friction{'' if self.never_slips else f', reset: {self.reset}'}"
 
     def cone(self, source: object) -> Cone:
         return Cone(MUJOCO_FRICTION, self.stiction_damping)
