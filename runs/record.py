@@ -139,10 +139,10 @@ EXPERIMENTS = {
         {},
     ),
     "thesis-drake": Experiment(
-        "the same evolved on the Drake diagram itself",
-        "thesis",
-        {"evolution.trials": 1, "evolution.evaluations": 250, "engine.scheme": "radau3"},
-        engine="drake",
+        "the same evolved on the Drake diagram itself, where nodes slip",
+        "thesis-reversal",
+        {"evolution.trials": 1, "evolution.evaluations": 250}
+        | {"engine": "!Drake {scheme: radau3, max_step: 8 ms, look_ahead: 0.00002 s}"},
     ),
     "cma-es": Experiment(
         "the same by CMA-ES, where nodes slip", "thesis", _by(CmaEs(), 10, 4000) | _SLIPPING
