@@ -232,7 +232,7 @@ def results_table(runs: Runs) -> str:
         initial, evolved = run.initial(), run.best()["distance_in"]
         columns.append(
             [
-                fixed(initial.groupby("trial")["distance_in"].max().max()),
+                fixed(initial["distance_in"].max()),
                 f"{100.0 * (initial['distance'] < 0.0).mean():.0f} %",
                 best.text("compiled").removesuffix(" in"),
                 best.text("diagram").removesuffix(" in"),

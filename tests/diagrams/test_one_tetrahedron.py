@@ -69,6 +69,9 @@ def test_it_breaks_free_at_the_stiction_range_and_sticks_again(scenario, sliding
     assert (sliding.modes[after, LEADING] == STICKS).all()
     [(lifted, landed)] = flights(sliding, TRAILING)
     assert lifted < 1e-3 < landed < end
+    slow = slide(load_scenario("thesis-reversal"), speed=3.0 * INCH, duration=0.03)
+    assert all(slips(slow, node) == [] for node in BASE)
+    assert 0.0 < travel(slow, LEADING)[-1] < scenario.friction.stiction_range
 
 
 def test_where_deflections_restart_at_the_range_it_never_slips(scenario):

@@ -188,7 +188,7 @@ def rows() -> Iterable[Any]:
         changes = begin | NO_BRISTLES | {"actuation": actuation}
         # The motor's software damping shakes the prism: its first order shows in short steps only.
         engines, name = (FINE[0], Limit(5e-5)), f"prism, {kind}, MuJoCo"
-        within = {"distance_in": 3e-3, "metrics.actuator_limited": 2e-4}
+        within = {"distance_in": 2e-3, "metrics.actuator_limited": 2e-4}
         yield row(name, "prism", 1.5, changes, engines, within, gait(2), slow=True)
     # A fifth of a second after events, two of them at once.
     events = [{"at": "0.1 s", "cut": ["T1-T2 outer bottom_left"], "lose": ["T2"]}]

@@ -78,7 +78,7 @@ _WORK = ("steps", "derivative_evaluations", "jacobian_evaluations")
 
 
 class _Pace(NamedTuple):
-    """Steps that suit a law of friction, where the settings do not say otherwise; times in s."""
+    """Steps that suit a law of friction; times in s. Settings may give max_step and look_ahead."""
 
     coarsest: float
     """Largest target accuracy."""
@@ -131,7 +131,7 @@ class _DiagramRobot(LoneRobot):
         self._work = _Work(self._simulator)
         self._aimer = _StepAimer(diagram, self._simulator, self._steps, self._work)
         times = motion_times(robot.scenario.simulation, record=record)
-        self._sampler = Sampler(diagram, times, max_step=self._steps.max_step)
+        self._sampler = Sampler(diagram, times, max_step=self._steps.pace.max_step)
         self.wall_time, self._speed_limit = 0.0, speed_limit(driven)
         self._marks, self._changes = driven.marks.tolist(), driven.changes
         self._held, self._change_end = robot.first_signals, 0.0
@@ -269,7 +269,7 @@ class _DiagramRobot(LoneRobot):
             reason = f"{used} derivative evaluations, the budget is {budget}"
             raise StepBudgetExceeded(time=now, reason=reason)
 
-        self._aimer.aim(context, velocities)
+        self._aimer.aim(context)
         self._sampler.after_step(context)
         signals, drives = [self._signals.Eval(context)], drives_at(self._diagram, context)
         if now == self.driven.start_up and self._diagram.HasSubsystemNamed("cpg"):
@@ -297,14 +297,13 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     steps = _Steps.of(robot, settings)
     simulator = _make_simulator(diagram, steps)
     aimer = _StepAimer(diagram, simulator, steps, _Work(simulator))
-    state, bodies = diagram.GetOutputPort("state"), len(robot.structure.bodies)
-    simulator.set_monitor(lambda now: aimer.aim(now, state.Eval(now)[7 * bodies :]))
+    simulator.set_monitor(aimer.aim)
     return simulator
 
 
 def _make_simulator(diagram: Diagram, steps: _Steps) -> Simulator:
     simulator = Simulator(diagram)
-    integrator = ResetIntegratorFromFlags(simulator, steps.scheme, steps.max_step)
+    integrator = ResetIntegratorFromFlags(simulator, steps.scheme, steps.pace.max_step)
     integrator.set_target_accuracy(steps.accuracy)
     if not steps.at_step_end:
         window = _WITNESS_WINDOW * min(1.0, steps.accuracy / 1e-3)
@@ -350,8 +349,6 @@ class _Steps:
 
     scheme: str
     accuracy: float
-    max_step: float
-    look_ahead: float
     at_step_end: bool
     """True if modes change at the end of steps."""
     pace: _Pace
@@ -360,15 +357,13 @@ class _Steps:
     def of(cls, robot: Robot, settings: Drake) -> _Steps:
         """The steps of a robot; see MakeSimulator()."""
         pace = _STICKING if robot.scenario.friction.never_slips else _SLIPPING
-        look_ahead = pace.look_ahead if settings.look_ahead is None else settings.look_ahead
-        ratio = _least_damping_ratio(robot)
+        accuracy = min(pace.coarsest, max(_FINEST, 0.5 * _least_damping_ratio(robot)))
+        given = {"max_step": settings.max_step, "look_ahead": settings.look_ahead}
         return cls(
             scheme=settings.scheme or default_scheme(robot),
-            accuracy=settings.accuracy or min(pace.coarsest, max(_FINEST, 0.5 * ratio)),
-            max_step=settings.max_step or pace.max_step,
-            look_ahead=look_ahead,
+            accuracy=settings.accuracy or accuracy,
             at_step_end=settings.mode_changes == "step_end",
-            pace=pace,
+            pace=pace._replace(**{key: x for key, x in given.items() if x is not None}),
         )
 
 
@@ -433,29 +428,26 @@ class _Work:
         """Work before the integrator was initialised for the last time."""
 
     @property
-    def _integrator(self) -> IntegratorBase:
-        return _integrator_of(self._simulator)
+    def integrator(self) -> IntegratorBase:
+        """The simulator's integrator."""
+        simulator = self._simulator()
+        assert simulator is not None
+        return simulator.get_mutable_integrator()
 
     def total(self, scheme: str = "", accuracy: float = 0.0) -> IntegratorWork:
-        before, statistics = self.before, dict(self._integrator.GetStatisticsSummary())
+        before, statistics = self.before, dict(self.integrator.GetStatisticsSummary())
         for_jacobian = int(statistics.get("integrator_num_derivative_evaluations_for_jacobian", 0))
         return IntegratorWork(
             scheme=scheme,
             accuracy=accuracy,
-            steps=before.steps + self._integrator.get_num_steps_taken(),
+            steps=before.steps + self.integrator.get_num_steps_taken(),
             derivative_evaluations=self.evaluations(),
             jacobian_evaluations=before.jacobian_evaluations + for_jacobian,
         )
 
     def evaluations(self) -> int:
         earlier = self.before.derivative_evaluations
-        return earlier + self._integrator.get_num_derivative_evaluations()
-
-
-def _integrator_of(simulator: weakref.ref[Simulator]) -> IntegratorBase:
-    alive = simulator()
-    assert alive is not None
-    return alive.get_mutable_integrator()
+        return earlier + self.integrator.get_num_derivative_evaluations()
 
 
 class _StepAimer:
@@ -483,11 +475,11 @@ class _StepAimer:
     """
 
     def __init__(self, diagram: Diagram, simulator: Simulator, steps: _Steps, work: _Work) -> None:
-        self._simulator, self._steps, self._work = weakref.ref(simulator), steps, work
+        self._pace, self._work, self._state = steps.pace, work, diagram.GetOutputPort("state")
         self._ground = diagram.GetSubsystemByName("ground")
         self._aims = (
             steps.at_step_end
-            and steps.look_ahead > 0.0
+            and steps.pace.look_ahead > 0.0
             and steps.scheme == "radau3"  # other schemes take short steps anyway
             and isinstance(self._ground, GroundContact)
         )
@@ -496,16 +488,12 @@ class _StepAimer:
         self._last_time = 0.0
         size = simulator.get_context().get_continuous_state().num_v()
         self._last_velocities = self._acceleration = np.zeros(size)
-        self._longest = steps.max_step
+        self._longest = steps.pace.max_step
         self._jacobian_is_old = False
-
-    @property
-    def _integrator(self) -> IntegratorBase:
-        return _integrator_of(self._simulator)
 
     def numbers(self) -> np.ndarray:
         """The state of the aimer as one array, for restore()."""
-        longest = self._integrator.get_maximum_step_size()
+        longest = self._work.integrator.get_maximum_step_size()
         own = [self._last_time, self._longest, float(self._jacobian_is_old), longest]
         return np.concatenate([own, self._last_velocities, self._acceleration])
 
@@ -514,47 +502,48 @@ class _StepAimer:
         self._last_time, self._longest, is_old, longest = numbers[:4].tolist()
         self._jacobian_is_old = bool(is_old)
         self._last_velocities, self._acceleration = np.split(numbers[4:].copy(), 2)
-        self._integrator.set_maximum_step_size(longest)
-        self._integrator.request_initial_step_size_target(longest)  # for Initialize()
+        self._work.integrator.set_maximum_step_size(longest)
+        self._work.integrator.request_initial_step_size_target(longest)  # for Initialize()
 
-    def aim(self, context: Context, velocities: np.ndarray) -> None:
+    def aim(self, context: Context) -> None:
         """Limits the length of the next step. Call it after each step, with the simulator's context
-        and the bodies' velocities v (6*bodies,), both at the end of the step."""
-        longest = self._steps.max_step
+        at the end of the step."""
+        pace, integrator = self._pace, self._work.integrator
+        longest = pace.max_step
         if self._struts is not None:
             here = self._struts.GetMyContextFromRoot(context)
             longest = self._struts.LongestStep(here, horizon=longest)
-            self._integrator.set_maximum_step_size(longest)
+            integrator.set_maximum_step_size(longest)
         if not self._aims:
             return
+        velocities = self._state.Eval(context)[-self._last_velocities.size :]
         step_taken = context.get_time() - self._last_time
         if step_taken > 0.0:
             self._acceleration = (velocities - self._last_velocities) / step_taken
         self._last_time, self._last_velocities = context.get_time(), velocities
 
-        look_ahead, pace = self._steps.look_ahead, self._steps.pace
         due, time_to_change = self._ground.NextModeChange(
             self._ground.GetMyContextFromRoot(context),
             acceleration=self._acceleration,
-            horizon=self._steps.max_step,
+            horizon=pace.max_step,
         )
         if due:
             self._longest, self._jacobian_is_old = pace.first_step, True
-        elif self._longest < self._steps.max_step:
+        elif self._longest < pace.max_step:
             self._longest = pace.growth * max(step_taken, pace.first_step)
-        if _NEAR < time_to_change < self._steps.max_step:
+        if _NEAR < time_to_change < pace.max_step:
             aimed = _APPROACH * time_to_change
         else:
-            margin = min(_AIM_BEYOND, 0.25 * look_ahead)
-            aimed = max(look_ahead, _AIM_FACTOR * time_to_change + margin)
+            margin = min(_AIM_BEYOND, 0.25 * pace.look_ahead)
+            aimed = max(pace.look_ahead, _AIM_FACTOR * time_to_change + margin)
         step = min(longest, self._longest, aimed)
         if self._jacobian_is_old and step >= pace.renew_from:
             self._work.before = self._work.total()
             # Initialize() needs a limit that allows the initial step, which is the longest.
-            self._integrator.set_maximum_step_size(self._steps.max_step)
-            self._integrator.Initialize()
+            integrator.set_maximum_step_size(pace.max_step)
+            integrator.Initialize()
             self._jacobian_is_old = False
-        self._integrator.set_maximum_step_size(step)
+        integrator.set_maximum_step_size(step)
 
 
 ENGINE = DrakeEngine()
