@@ -5,15 +5,14 @@
 A candidate is a vector: weights and time constants. evolution.html shows the best one walking.
 """
 
-import sys
+import argparse
 
 import numpy as np
 from block_diagram import OUT
 
 import tetra_drake as td
 from tetra_drake.engines.drake import MakeSimulator
-from tetra_drake.optimizers import optimizer_of
-from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.optimizers import Evaluation, optimizer_of
 from tetra_drake.robot.gait import AnyGait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
@@ -42,9 +41,10 @@ def main(evaluations: int = 28) -> None:
         search.tell([Evaluation(fitness=way) for way in found])
         gaits, ways = gaits + asked, ways + found
         print(f"{len(ways)} gaits, the best {max(ways):.3f} m", flush=True)
-    best = gaits[ways.index(max(ways))]
-    td.simulate(SCENARIO, best, record=True).save_replay(OUT / "evolution.html")
+    td.simulate(SCENARIO, gaits[np.argmax(ways)], record=True).save_replay(OUT / "evolution.html")
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("evaluations", nargs="?", type=int, default=28)
+    main(**vars(parser.parse_args()))

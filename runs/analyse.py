@@ -77,6 +77,9 @@ SHOWN = ("cost_of_transport", "tension", "clearance")
 SPEED = "relative_speed"
 """Metric of the best gaits that is shown in the gallery: body lengths per second."""
 
+DRAWN = ("5 %", "95 %")
+"""Quantiles of a gait's distances in draws of disturbances that pages show."""
+
 _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
 _COLUMNS = {
     "best_gaits": (
@@ -91,7 +94,7 @@ _COLUMNS = {
     ),
     "resimulations": ("trial", "setting", "distance_in", TURNED),
     "unseen": ("trial", "seed", "distance_in", "met"),
-    "disturbed": ("gait", "undisturbed", *_MEAN, *_KEPT, "failed", "missed"),
+    "disturbed": ("gait", "undisturbed", *DRAWN, *_MEAN, *_KEPT, "failed", "missed"),
 }
 _NUMBERS = [*SHOWN, SPEED, "sensitivity_in", "distance_in", TURNED]
 """Columns with numbers that may all be null."""

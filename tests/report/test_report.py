@@ -8,17 +8,29 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from analyse import load_analysis
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import make_parser
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.run import load_run
 from tetra_drake.formatting import rounded
-from tetra_drake.report.run_page import render_report, simulate_shown_gaits, write_report
+from tetra_drake.report.run_page import (
+    BLOCK_DIAGRAM,
+    RECORDED_GAIT,
+    render_report,
+    simulate_shown_gaits,
+    write_report,
+)
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 from .conftest import COSTS, TRIALS
 
+CHECKOUT = Path(__file__).parents[2]
 EVIL = """<script>alert(1)</script> & "quoted" 'name'"""
 
 
@@ -181,3 +193,30 @@ def test_an_unfinished_run_and_what_the_diagram_made_of_its_best(tmp_path):
     (place,) = (row.index("in Drake") for row in page.table if "in Drake" in row)
     trials = [row for row in page.table if "not finished" in row or row[0] == "1"]
     assert [row[place] for row in trials if len(row) > place] == ["1.23", "1.23"]
+
+
+def test_a_run_of_the_thesis_s_robot_shows_its_diagram_and_the_best_recorded_gait(tmp_path, run):
+    brief = {"simulation.duration": "0.1 s", "simulation.steady_from": "0 s"}
+    scenario = load_scenario("quick").with_changes(brief)
+    folder = write_run(tmp_path / "run", TRIALS, scenario=scenario)
+    write_report(folder)
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    frames = [values["src"] for tag, values in page.tags if tag == "iframe"]
+    assert frames == ["replay.html", "recorded.html"]
+    assert all((folder / frame).is_file() for frame in frames)
+    images = [values["src"].split(",", 1)[1] for tag, values in page.tags if tag == "img"]
+    assert BLOCK_DIAGRAM.read_bytes() in map(base64.b64decode, images)
+    assert not (run / "recorded.html").exists()  # of another robot
+
+
+def test_the_block_diagram_and_the_recorded_gait_are_up_to_date():
+    best = load_analysis(CHECKOUT / "runs/thesis").best_trial
+    recorded = CHECKOUT / f"runs/thesis/trial_{best:02}/best_gait.json"
+    assert RECORDED_GAIT.read_bytes() == recorded.read_bytes()
+    scenario = load_scenario("thesis")
+    diagram = MakeTensegrityDiagram(Robot.of(scenario), load_gait(RECORDED_GAIT, scenario))
+    drawn = BLOCK_DIAGRAM.read_text(encoding="utf-8")
+    for system in diagram.GetSystems():
+        assert {f">{type(system).__name__}<", f">{system.get_name()}<"} <= set(
+            re.findall(">[^<>]+<", drawn)
+        )

@@ -22,6 +22,7 @@ from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.settings.units import INCH
 from tetra_drake.study.elites import elites
+from tetra_drake.study.robustness import DRAWS
 
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
 """Runs of one's own may lie beside them."""
@@ -109,6 +110,27 @@ def test_the_pages_show_the_recorded_runs(runs):
     assert set(runs) == set(FOLDERS)
     for page in tables.pages(runs):
         assert tables.made_again(page, runs) == page.read_text(encoding="utf-8"), page
+
+
+def test_numbers_in_the_text_are_those_of_the_records(runs):
+    """On the pages README.md and runs/README.md, outside their tables."""
+    front, page = (
+        " ".join((folder / tables.README).read_text(encoding="utf-8").split())
+        for folder in (tables.FRONT, tables.HERE)
+    )
+    found = tables.differences(runs)
+    assert found["diagram"].median() < 0.01 and "to a hundredth of an inch, in the median" in front
+    coulomb = found[found["coulomb"]]
+    first, second, third, *others = coulomb.sort_values("diagram", ascending=False)["diagram"]
+    assert first > second > 3.0 > third and "two gaits differ by more than 3 in" in page
+    more, least = f"{third:.1f} in", f"{max(others):.1f} in"
+    assert f"differs by {more}, all others by at most {least}" in page
+    slips = coulomb["run"] == "winch"
+    low, high = 100.0 * coulomb[slips]["mujoco"].agg(["min", "max"])
+    assert f"largest, {low:.0f} to {high:.0f} %, are from `winch`" in page
+    elsewhere = 100.0 * coulomb[~slips]["mujoco"].max()
+    assert f"in all other runs it is at most {elsewhere:.0f} %" in page
+    assert f"share of {DRAWS} disturbed robots" in page
 
 
 def test_the_gallery_is_current_and_opens_every_replay_in_its_folder(runs):

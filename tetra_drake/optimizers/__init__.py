@@ -6,6 +6,7 @@ import functools
 import importlib
 
 from tetra_drake.machine import check_package
+from tetra_drake.optimizers.base import Evaluation as Evaluation
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.optimizers.cma_es import CmaEsOptimizer as CmaEsOptimizer
 from tetra_drake.optimizers.generational import Generational as RandomSearchOptimizer  # noqa: F401

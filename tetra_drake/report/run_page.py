@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import pandas
 
+from tetra_drake import systems
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, BEST_SCENARIO, trial_folder
@@ -45,7 +46,7 @@ from tetra_drake.machine import versions
 from tetra_drake.report import summary
 from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
 from tetra_drake.results.result import SimulationResult, headline
-from tetra_drake.robot.gait import AnyGait, Gait, PolicyParameters, save_gait
+from tetra_drake.robot.gait import AnyGait, Gait, PolicyParameters, load_gait, save_gait
 from tetra_drake.robot.remarks import stillness_remark
 from tetra_drake.scenario import metrics
 from tetra_drake.scenario.load import SCENARIO, load_scenario
@@ -57,6 +58,11 @@ ELITES, ELITES_CSV = "elites", "elites/elites.csv"
 
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
 _MOST_PARAMETERS = 40  # of a policy; further ones are not shown
+RECORDED_GAIT, RECORDED = Path(__file__).with_name("thesis_gait.json"), "recorded.html"
+"""The best recorded gait of the thesis's robot, and the name of its replay page."""
+BLOCK_DIAGRAM = Path(systems.__file__).with_name("robot.svg")
+"""Block diagram of the thesis's robot, as Graphviz draws it."""
+_NOT_OF_THE_ROBOT = ("engine", "evolution.", "optimizer", "simulation.")
 # Settings that are not shown among those that differ from the thesis's; some are elsewhere.
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "evolve.", "simulation.duration")
 
@@ -90,6 +96,9 @@ class ShownGaits:
     """Fittest gait of the run."""
     initial: RecordedGait
     """Fittest initial gait of the same trial; see Run.initial_best()."""
+    recorded: SimulationResult | None = None
+    """The best recorded gait of the thesis's robot, walking as long as the run's gaits. None if the
+    run is about another robot or other physics."""
 
 
 Pictures = Mapping[str, Sequence[partial[Any]]]
@@ -160,12 +169,15 @@ def write_report(directory: Path, printed: Print = AS_USUAL) -> list[Path]:
             _simulate_again(run, row).result.save_replay(directory / str(page))
     best = shown.best
     dataclasses.replace(best.result, spread=run.spread_of(best.recorded)).save_replay(replay)
+    if shown.recorded is not None:
+        shown.recorded.save_replay(directory / RECORDED)
     write_whole(report, render_report(shown, pictures, folder=figures))
     return [figures, replay, report]
 
 
 def simulate_shown_gaits(run: Run) -> ShownGaits:
-    """Simulates the fittest gait of a run and the fittest initial gait of the same trial.
+    """Simulates the fittest gait of a run and the fittest initial gait of the same trial. For a run
+    about the thesis's robot, also simulates the best recorded gait.
 
     Raises InputError if no gait of the run has a fitness. Raises SimulationFailure if a simulation
     fails; this can happen with versions other than the run's.
@@ -174,7 +186,12 @@ def simulate_shown_gaits(run: Run) -> ShownGaits:
     first = run.initial_best(fittest["trial"])
     best = _simulate_again(run, fittest)
     initial = best if first["index"] == fittest["index"] else _simulate_again(run, first)
-    return ShownGaits(run, best=best, initial=initial)
+    changed = [key for key, _ in run.scenario.differences(load_scenario("thesis"))]
+    if not all(key.startswith(_NOT_OF_THE_ROBOT) for key in changed):
+        return ShownGaits(run, best=best, initial=initial)
+    gait = load_gait(RECORDED_GAIT, run.scenario)
+    recorded = simulate(run.scenario, gait, record=True)
+    return ShownGaits(run, best=best, initial=initial, recorded=recorded)
 
 
 def _simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
@@ -237,10 +254,13 @@ def _embedded(picture: partial[Any], folder: Path) -> dict[str, str]:
     `folder` as a data URI."""
     name = picture.func.__name__
     caption = (inspect.getdoc(picture.func) or "").partition("\n\n")[0]
-    content = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode()
-    # As an image: the ids of two SVGs in one page would clash.
-    image = f"data:image/svg+xml;base64,{content}"
+    image = _data_uri(folder / f"{name}.svg")
     return {"name": name, "caption": " ".join(caption.split()), "image": image}
+
+
+def _data_uri(drawing: Path) -> str:
+    """An SVG file as the address of an image. Inline, the ids of two SVGs would clash."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(drawing.read_bytes()).decode()}"
 
 
 def _parameters_text(gait: AnyGait, scenario: Scenario) -> str:
@@ -285,6 +305,7 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
             part: [_embedded(picture, folder) for picture in drawn]
             for part, drawn in pictures.items()
         },
+        block_diagram=_data_uri(BLOCK_DIAGRAM),
         gaits=gaits,
         map=_notable(shown),
         parameters=_parameters_text(gait, scenario),
@@ -295,6 +316,7 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
         files={
             "scenario": SCENARIO,
             "replay": REPLAY,
+            "recorded": RECORDED,
             "figures": FIGURES,
             "elites": ELITES_CSV,
             "body": folder_of_best / BEST_SCENARIO,
