@@ -25,11 +25,11 @@ import numpy as np
 import pandas
 from analyse import DRAWN, MUJOCO, SHOWN, SPEED, TIGHT, TURNED, Analysis, load_analysis
 from PIL import Image
+from readings import RECORD, load_record
 from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, uncertain
 from tetra_drake.laws.friction import Coulomb
@@ -252,18 +252,17 @@ def trust_table(runs: Runs) -> str:
 
 def results_table(runs: Runs) -> str:
     """Table of the thesis's results and ours, for README.md."""
-    names = ("thesis", "thesis-listing")
-    columns = []
-    for name in names:
-        run, best = load_run(HERE / name), best_gait(name, runs[name])
-        initial, evolved = run.initial(), run.best()["distance_in"]
+    names = {"thesis": "thesis", "thesis-listing": "listing"}
+    readings, columns = load_record(RECORD), []
+    for name, reading in names.items():
+        best, trials = best_gait(name, runs[name]), pandas.DataFrame(readings[reading])
         columns.append(
             [
-                fixed(initial["distance_in"].max()),
-                f"{100.0 * (initial['distance'] < 0.0).mean():.0f} %",
+                fixed(trials["initial_farthest_in"].max()),
+                f"{100.0 * trials['backward'].mean():.0f} %",
                 best.text("compiled").removesuffix(" in"),
                 best.text("diagram").removesuffix(" in"),
-                fixed(evolved.mean()),
+                fixed(trials["best_in"].mean()),
             ]
         )
     labels = {
