@@ -127,8 +127,9 @@ class Analysis:
     def again(self, trial: int, setting: str, what: str = "distance_in") -> float:
         """Distance (in) or TURNED of a trial's fittest gait with a setting; NaN if it was not
         simulated."""
-        rows = self.resimulations.query("trial == @trial and setting == @setting")
-        return float(rows[what].iloc[0]) if len(rows) else math.nan
+        table = self.resimulations
+        found = table[what].to_numpy()[(table["trial"] == trial) & (table["setting"] == setting)]
+        return float(found[0]) if len(found) else math.nan
 
     def undisturbed(self, trial: int) -> float:
         """Distance (in) of a trial's fittest gait on the compiled engine."""
