@@ -96,11 +96,12 @@ class _Pace(NamedTuple):
 _SLIPPING = _Pace(
     5e-3, max_step=8e-3, look_ahead=2e-5, first_step=3e-4, growth=3.0, renew_from=8e-4
 )
-_STICKING = _Pace(
+_VISCOUS = _Pace(
     1e-2, max_step=12e-3, look_ahead=3e-4, first_step=1e-4, growth=2.0, renew_from=3e-3
 )
-"""For nodes that never slip. A foot that lands fast is thrown off the ground by its friction, up to
-seven thousand times per second. Steps that end at each of these contacts gain nothing."""
+"""For friction that is nearly viscous. A foot that lands fast is thrown off the ground by its
+friction, up to seven thousand times per second. Steps that end at each of these contacts gain
+nothing."""
 
 
 class DrakeEngine(Engine):
@@ -287,9 +288,9 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     """Drake's Simulator for a robot's diagram, with the integrator settings of the scenario.
 
     If the scenario sets no target accuracy, it is half the least damping ratio of a cable, but at
-    least 2e-5 and at most 5e-3, or 1e-2 where nodes never slip. The damping ratio c / (2 sqrt(k m))
-    is for the cable's damping c and stiffness k, and the reduced mass m of the two bodies that it
-    joins. For a structure without elastic cables it is 2e-5.
+    least 2e-5 and at most 5e-3, or 1e-2 where friction is nearly viscous. The damping ratio
+    c / (2 sqrt(k m)) is for the cable's damping c and stiffness k, and the reduced mass m of the
+    two bodies that it joins. For a structure without elastic cables it is 2e-5.
 
     The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
     monitor replaces it.
@@ -356,7 +357,7 @@ class _Steps:
     @classmethod
     def of(cls, robot: Robot, settings: Drake) -> _Steps:
         """The steps of a robot; see MakeSimulator()."""
-        pace = _STICKING if robot.scenario.friction.never_slips else _SLIPPING
+        pace = _VISCOUS if robot.scenario.friction.is_viscous else _SLIPPING
         accuracy = min(pace.coarsest, max(_FINEST, 0.5 * _least_damping_ratio(robot)))
         given = {"max_step": settings.max_step, "look_ahead": settings.look_ahead}
         return cls(

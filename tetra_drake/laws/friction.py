@@ -82,6 +82,9 @@ STICK = 0.0
 Vector2 = tuple[Real, Real]
 """Components along the tangents t1 and t2."""
 
+_LITTLE = 0.05
+"""Largest share of a bristle in a friction that is nearly viscous."""
+
 MUJOCO_FRICTION = 0.5
 """Coefficient of MuJoCo's friction in place of the thesis's law; typical of metal on a floor."""
 
@@ -117,9 +120,9 @@ class FrictionKind(Section):
         return self
 
     @property
-    def never_slips(self) -> bool:
-        """True if nodes on the ground stick at all times. Then a coarse step cannot miss the moment
-        when a node begins or ends to slip."""
+    def is_viscous(self) -> bool:
+        """True if friction is nearly proportional to velocity at all times. Then coarse steps
+        suffice: they cannot miss the moment when a node begins or ends to slip."""
         return False
 
     @property
@@ -252,12 +255,14 @@ class ResetIntegrator(FrictionKind):
         return self
 
     @property
-    def never_slips(self) -> bool:
-        return self.reset == "range"
+    def is_viscous(self) -> bool:
+        bristle = (1.0 + self.stiction_switch) * self.stiction_range * self.proportional_stiction
+        little = self.stiffness == 0.0 and bristle <= _LITTLE * self.stiction_damping
+        return self.reset == "range" and little
 
     @property
     def text(self) -> str:
-        return f"the thesis's friction{'' if self.never_slips else f', reset: {self.reset}'}"
+        return f"the thesis's friction{'' if self.reset == 'range' else f', reset: {self.reset}'}"
 
     def cone(self, source: object) -> Cone:
         return Cone(MUJOCO_FRICTION, self.stiction_damping)

@@ -42,15 +42,15 @@ class Drake(EngineSettings):
     accuracy: float | None = Field(default=None, gt=0)
     """Target accuracy per step. If not given, half the least damping ratio of a cable between its
     bodies, from 2e-5 to 0.005: longer steps of radau3 would damp vibrations more than the cables
-    do. Where nodes never slip, as with `friction.reset: range`, it is up to 0.01."""
+    do. Where friction is nearly viscous, as in the scenario thesis, it is up to 0.01."""
     max_step: Time | None = Field(default=None, gt=0)
-    """Longest step. If not given, 8 ms; 12 ms where nodes never slip."""
+    """Longest step. If not given, 8 ms; 12 ms where friction is nearly viscous."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
     """When a node may change its mode: at the end of steps, or where a witness function is zero.
     `witness` needs short steps, such as the steps of runge_kutta3."""
     look_ahead: Time | None = Field(default=None, ge=0)
     """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none. If not
-    given, 20 us; 0.3 ms where nodes never slip."""
+    given, 20 us; 0.3 ms where friction is nearly viscous."""
 
 
 class Compiled(EngineSettings):
@@ -60,13 +60,13 @@ class Compiled(EngineSettings):
     module: ClassVar[str] = "tetra_drake.engines.lanes.batch"
     tolerance: Speed | None = Field(default=None, gt=0)
     """Permitted error per step of the velocity of a body; for rotations, of its strut tips. If not
-    given, 0.1 mm/s; 5 mm/s where nodes never slip, as with `friction.reset: range`."""
+    given, 0.1 mm/s; 5 mm/s where friction is nearly viscous, as in the scenario thesis."""
     max_step: Time = Field(default=0.003, gt=SHORTEST_STEP, le=1)
     """Longest step."""
 
     def tolerance_under(self, friction: FrictionKind) -> float:
         """The tolerance in m/s; if not given, the default for this friction."""
-        return self.tolerance or (5e-3 if friction.never_slips else 1e-4)
+        return self.tolerance or (5e-3 if friction.is_viscous else 1e-4)
 
 
 def look_ahead(tolerance: float) -> float:
