@@ -24,6 +24,7 @@ from tetra_drake.settings.units import INCH
 from tetra_drake.study.elites import elites
 from tetra_drake.study.robustness import DRAWS
 
+DRAKE = "`!Drake {}`"
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
 """Runs of one's own may lie beside them."""
 
@@ -131,6 +132,15 @@ def test_numbers_in_the_text_are_those_of_the_records(runs):
     elsewhere = 100.0 * coulomb[~slips]["mujoco"].max()
     assert f"in all other runs it is at most {elsewhere:.0f} %" in page
     assert f"share of {DRAWS} disturbed robots" in page
+
+    engines = (tables.FRONT / "tetra_drake/engines/README.md").read_text(encoding="utf-8")
+    rows = [re.split(r"\s*\|\s*", line.strip("| ")) for line in engines.splitlines()]
+    times = {row[0]: row for row in rows if len(row) > 4}
+    assert round(float(times["1"][-1].replace(",", ".")), 0) == 2.0  # thousands
+    assert "two thousand times faster than real time" in front
+    [relative] = [row[3] for row in rows if row[:2] == ["`reset: range`, live (`thesis`)", DRAKE]]
+    assert 2.0 <= float(times[DRAKE][1]) * float(relative) <= 3.0
+    assert "in place of two or three times" in front
 
 
 def test_the_gallery_is_current_and_opens_every_replay_in_its_folder(runs):
