@@ -128,7 +128,7 @@ class Fit:
         simulated time."""
         offsets = {name: 1e3 * offset for name, offset in self.clock_offsets.items() if offset}
         clocks = [f"the clock of {name} is ahead by {ms:.2f} ms" for name, ms in offsets.items()]
-        placed = [f"{name}: {note}" for name, notes in self.placement.items() for note in notes]
+        placed = [f"{name} {note}" for name, notes in self.placement.items() for note in notes]
         return [*self.warnings, *clocks, *placed]
 
     @property

@@ -90,6 +90,8 @@ class Measured:
     list; measured; uncertainty, its standard deviation."""
     predict: Callable[[Sequence[Scenario]], list[Prediction]]
     """What scenarios predict; NaN if a scenario cannot be simulated."""
+    has_notes: bool = False
+    """Whether predictions have notes."""
 
 
 class MotionCapture(Section):
@@ -142,11 +144,9 @@ class MotionCapture(Section):
         found, slack = last - first, ROUNDING + (self.clock or 0.0)
         is_outside = first < -slack or last > duration + slack
         if found > duration + ROUNDING or (is_outside and self.clock is not None):
-            expected = (
-                f"found {first:.12g} to {last:.12g} s, expected 0 to {duration:g}, within clock"
-            )
-            remedy = "give simulation.duration more, or leave out `clock` to find any offset"
-            raise InputError(self.log, TIME_S, f"{expected}; {remedy}")
+            problem = f"found {first:.12g} to {last:.12g} s, expected 0 to {duration:g} s"
+            remedy = "give simulation.duration more" if found > duration else "leave out `clock`"
+            raise InputError(self.log, TIME_S, f"{problem}; {remedy}")
         least = 0.0
         if isinstance(driver, Command):
             least = min(duration, driver.period * (len(driver.samples) - 1))
@@ -165,7 +165,7 @@ class MotionCapture(Section):
             "uncertainty": [self.uncertainty] * len(row) + [self.marker_offset] * len(offsets),
         }
         predict = functools.partial(self.predict, driver=driver, log=table, note=note)
-        return Measured(f"{name}, {Path(self.log).name}", pandas.DataFrame(numbers), predict)
+        return Measured(f"{name}, {Path(self.log).name}", pandas.DataFrame(numbers), predict, True)
 
     def _named(self, log: pandas.DataFrame, structure: Structure) -> tuple[pandas.DataFrame, str]:
         """The log with all coordinates of its nodes as columns, and a text that says which nodes
@@ -275,7 +275,7 @@ class MotionCapture(Section):
             place = ", ".join(f"{fixed(1e3 * each, 1)} mm" for each in origin)
             angles = Rotation.from_matrix(turn).as_euler("XYZ", degrees=True)
             angle = ", ".join(f"{fixed(each)} deg" for each in angles)
-            notes.append(f"origin: [{place}], turn: [{angle}]")
+            notes.append(f"has the frame origin: [{place}], turn: [{angle}]")
         values = np.append((p @ turn.T + origin)[is_there], offsets)
         return Prediction(values, float(shift + first), notes)
 
