@@ -128,7 +128,7 @@ class Fit:
         simulated time."""
         offsets = {name: 1e3 * offset for name, offset in self.clock_offsets.items() if offset}
         clocks = [f"the clock of {name} is ahead by {ms:.2f} ms" for name, ms in offsets.items()]
-        placed = [f"{name} {note}" for name, notes in self.placement.items() for note in notes]
+        placed = [f"{name}: {note}" for name, notes in self.placement.items() for note in notes]
         return [*self.warnings, *clocks, *placed]
 
     @property
@@ -356,7 +356,7 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
         f"the stated uncertainty: {fit.start_misfit:.3g} with the start values, "
         f"{fit.misfit:.3g} fitted; 1 is a model that is right. Intervals are of 95 %, "
         "from the derivatives at the fitted values. Where the misfit exceeds 1, they are wider "
-        "by its root. The tolerance of a value counts as a measurement of it."
+        "by its root; far above 1 there are none. The tolerance of a value counts as a measurement."
     )
     unknown = UNKNOWN.replace("\n", " ") if fit.parameters["low"].isna().any() else ""
     pages = write_page(

@@ -275,7 +275,7 @@ class MotionCapture(Section):
             place = ", ".join(f"{fixed(1e3 * each, 1)} mm" for each in origin)
             angles = Rotation.from_matrix(turn).as_euler("XYZ", degrees=True)
             angle = ", ".join(f"{fixed(each)} deg" for each in angles)
-            notes.append(f"has the frame origin: [{place}], turn: [{angle}]")
+            notes.append(f"the frame has origin: [{place}], turn: [{angle}]")
         values = np.append((p @ turn.T + origin)[is_there], offsets)
         return Prediction(values, float(shift + first), notes)
 
