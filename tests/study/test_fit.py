@@ -396,6 +396,11 @@ def test_markers_match_nodes_where_only_one_choice_is_near():
     # A square with a mast is the same after quarters of a turn.
     p = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 3.0]])
     assert len(matches(p, turn.apply(p), np.full((5, 5), True), 1e-3)) == 4
+    # Three rungs of a ladder of four may be the first or the last three.
+    rung = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.6]])
+    p = np.concatenate([rung + np.array([each, 0.0, 0.0]) for each in range(4)])
+    choices = matches(p, p[3:12], np.full((9, 12), True), 1e-3)
+    assert choices == [[*range(first, first + 9)] for first in (0, 3)]
 
 
 def test_where_a_number_is_far_off_there_is_no_interval_and_it_is_named(by_formula):

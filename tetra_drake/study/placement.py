@@ -15,7 +15,7 @@ Frame = tuple[np.ndarray, np.ndarray]
 
 UPS = np.vstack([np.eye(3)[::-1], -np.eye(3)[::-1]])
 """Axes of a log that may point up, the likeliest first: z, y, x, and the opposite ones."""
-UPRIGHT, FAR, CLEAR, PASSES = 0.97, 0.2, 3.0, 5
+UPRIGHT, FAR, CLEAR, PASSES = 0.97, 0.1, 3.0, 3
 """Limits of a match: least cosine of the tilt of an upward axis; greatest distance of markers from
 nodes as a share of the markers' size, and as a multiple of the least one; number of passes."""
 
@@ -23,7 +23,8 @@ nodes as a share of the markers' size, and as a multiple of the least one; numbe
 def aligned(p: np.ndarray, seen: np.ndarray) -> Frame:
     """The frame that brings points p (k, 3) of a model nearest to the `seen` ones (k, 3)."""
     here, there = p.mean(axis=0), seen.mean(axis=0)
-    turn = Rotation.align_vectors(seen - there, p - here)[0].as_matrix()
+    left, _, right = np.linalg.svd((seen - there).T @ (p - here))
+    turn = left * [1.0, 1.0, np.linalg.det(left @ right)] @ right  # no reflection
     return turn, there - turn @ here
 
 
@@ -52,10 +53,12 @@ def matches(p: np.ndarray, seen: np.ndarray, may_be: np.ndarray, noise: float) -
     the best choice, and those that are as good with a `noise` in m. Only choices with the likeliest
     upward axis count; there is none where markers are not near nodes."""
     found: dict[tuple[int, ...], tuple[int, float]] = {}
-    starts = itertools.product(*map(Rotation.create_group, ("O", "C3")))  # 30 degrees apart
-    for upright, yaw in starts:
+    # Starts are 30 degrees apart. Some markers of a regular robot may be at several places of it.
+    centres = np.vstack([p.mean(axis=0), p if len(seen) < len(p) else p[:0]])
+    turns = itertools.product(*map(Rotation.create_group, ("O", "C3")))
+    for (upright, yaw), centre in itertools.product(turns, centres):
         turn = (upright * yaw).as_matrix()
-        origin = seen.mean(axis=0) - turn @ p.mean(axis=0)
+        origin = seen.mean(axis=0) - turn @ centre
         for _ in range(PASSES):
             squares = ((seen[:, np.newaxis] - p @ turn.T - origin) ** 2).sum(axis=2)
             nodes = linear_sum_assignment(np.where(may_be, squares, 1e12))[1]
