@@ -54,6 +54,9 @@ SAME_DIRECTION = 1e-10
 the parameters."""
 LIKELY = 3.0
 """Excess of the misfit over 1, in standard deviations, up to which a fit explains the data."""
+FAR, OUTLYING = 4.0, 16.0
+"""Limits above which there are no intervals, as something is wrong: the misfit, with the same
+excess, and the mean square of the weighted residuals of one coordinate or another number."""
 STRONG = 0.95
 """Correlation above which a warning names two parameters."""
 
@@ -68,10 +71,15 @@ shown."""
 NAMES = 24
 """Largest number of names on an axis of the figure. If there are more, only some are written."""
 
-UNKNOWN = """`± ?` is an unknown interval: the data do not determine the value, or predictions are
-not smooth. Then their derivatives by steps of 0.1 % and 1 % of the start differ by more than 20 %.
-One contact that comes or goes, in any part of a log, is enough: without this part, or with other
-noise, there may be an interval."""
+WRONG = (
+    "the misfit of {misfit:.3g}, with residuals up to {largest}, allows no intervals: the model, a "
+    "number or unit, or the clock, frame or a marker of a log is wrong (give it clock, origin and "
+    "turn, or marker_offset), or an uncertainty is too small"
+)
+UNKNOWN = """`± ?` is an unknown interval: the data do not determine the value, the misfit is far
+above 1, or predictions are not smooth. Then their derivatives by steps of 0.1 % and 1 % of the
+start differ by more than 20 %. One contact that comes or goes, in any part of a log, is enough:
+without this part, or with other noise, there may be an interval."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +100,8 @@ class Fit:
     """
     clock_offsets: dict[str, float]
     """Time (s) by which the clock of each measurement is ahead of the simulated time."""
+    placement: dict[str, Sequence[str]]
+    """What was found besides for each measurement: nodes, frame and offsets of markers."""
     misfit: float
     """Sum of squares of the weighted residuals per degree of freedom; 1 if the model and the
     uncertainties are right."""
@@ -114,11 +124,12 @@ class Fit:
 
     @property
     def notes(self) -> list[str]:
-        """Warnings as sentences, and one for each measurement whose clock is ahead of the simulated
-        time."""
+        """Warnings as sentences, and what was found for logs, such as a clock that is ahead of the
+        simulated time."""
         offsets = {name: 1e3 * offset for name, offset in self.clock_offsets.items() if offset}
         clocks = [f"the clock of {name} is ahead by {ms:.2f} ms" for name, ms in offsets.items()]
-        return [*self.warnings, *clocks]
+        placed = [f"{name}: {note}" for name, notes in self.placement.items() for note in notes]
+        return [*self.warnings, *clocks, *placed]
 
     @property
     def table(self) -> TextTable:
@@ -229,7 +240,11 @@ def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: fl
     size = np.linalg.norm(jacobian, axis=0)
     smooth = difference / np.where(size > 0.0, size, 1.0) < ROUGH
     determined = np.isfinite(half)
-    known = determined & (smooth | ~determined).all()
+    excess = LIKELY * math.sqrt(2.0 / max(1, last.size - x.size))
+    labels = problem.numbers["label"] + " of " + problem.numbers["measurement"]
+    squares = pandas.Series(last[: len(labels)] ** 2).groupby(labels).mean()
+    is_wrong = misfit > FAR + excess or squares.max() > OUTLYING
+    known = determined & (smooth | ~determined).all() & (not is_wrong)
 
     values, width = x * problem.scale, np.where(known, half, np.nan)
     given = pandas.DataFrame(problem.parameters).set_index("key")
@@ -237,18 +252,22 @@ def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: fl
     table = pandas.DataFrame(ends, given.index).join(given)
     table = table.assign(determined=determined, smooth=smooth)
     correlations = pandas.DataFrame(correlation, index=given.index, columns=given.index)
-    explained = misfit <= 1.0 + LIKELY * math.sqrt(2.0 / max(1, last.size - x.size))
     weighted = [each[: problem.values.size] for each in (first, last)]  # without tolerances
     predicted = [problem.values + problem.uncertainty * each for each in weighted]
+    warnings = _warnings(table, correlations, explained=misfit <= 1.0 + excess)
+    if is_wrong:
+        largest = f"{math.sqrt(squares.max()):.3g} standard deviations for {squares.idxmax()}"
+        warnings.insert(0, WRONG.format(misfit=misfit, largest=largest))
     return Fit(
         scenario=problem.scenario_at(x),
         parameters=table,
         correlations=correlations,
         residuals=problem.numbers.assign(start=predicted[0], fitted=predicted[1]),
         clock_offsets=problem.clock_offsets(x),
+        placement=problem.notes(x),
         misfit=misfit,
         start_misfit=problem.misfit(first),
-        warnings=_warnings(table, correlations, explained=explained),
+        warnings=warnings,
         evaluations=problem.evaluations,
         wall_time=wall_time,
     )
@@ -321,6 +340,7 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
         "misfit": fit.misfit,
         "start_misfit": fit.start_misfit,
         "clock_offsets_s": fit.clock_offsets,
+        "placement": fit.placement,
         "warnings": fit.warnings,
         "evaluations": fit.evaluations,
         "wall_time_s": fit.wall_time,
@@ -336,7 +356,7 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
         f"the stated uncertainty: {fit.start_misfit:.3g} with the start values, "
         f"{fit.misfit:.3g} fitted; 1 is a model that is right. Intervals are of 95 %, "
         "from the derivatives at the fitted values. Where the misfit exceeds 1, they are wider "
-        "by its root. The tolerance of a value counts as a measurement of it."
+        "by its root; far above 1 there are none. The tolerance of a value counts as a measurement."
     )
     unknown = UNKNOWN.replace("\n", " ") if fit.parameters["low"].isna().any() else ""
     pages = write_page(

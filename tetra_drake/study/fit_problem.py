@@ -180,6 +180,11 @@ class FitProblem:
         offsets = self._known[self._name(x)][self._clocks].tolist()
         return dict(zip([each.name for each in self.measured], offsets, strict=True))
 
+    def notes(self, x: np.ndarray) -> dict[str, Sequence[str]]:
+        """Prediction.notes by measurement at the point `x`, which is simulated again for them."""
+        logs, scenarios = [each for each in self.measured if each.has_notes], [self.scenario_at(x)]
+        return {each.name: each.predict(scenarios)[0].notes for each in logs}
+
     def sums_of_squares(self, points: np.ndarray) -> np.ndarray:
         """Sums (k,) of the squares of the weighted residuals at k points (k, n), which are
         simulated in parallel; 1e200 where a simulation fails."""

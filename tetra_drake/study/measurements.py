@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import io
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,17 +21,27 @@ from pydantic import AfterValidator, Field
 from tetra_drake.engines.simulate import Outcome, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import read_bytes, read_text
+from tetra_drake.formatting import fixed
 from tetra_drake.laws.cable import TENSION
+from tetra_drake.laws.model import WORLD
 from tetra_drake.prototype.command_file import TIME_S, column_numbers, load_command, table_cells
 from tetra_drake.robot.command import Command, Driver
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.common_sections import different_keys
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import read_mapping
-from tetra_drake.settings.quantities import ForceQuantity, Frequency, Keyed, Length, Time
+from tetra_drake.settings.quantities import (
+    Angle,
+    ForceQuantity,
+    Frequency,
+    Keyed,
+    Length,
+    Position,
+    Time,
+)
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Kinds, Section, keys_of
 from tetra_drake.settings.units import given_quantity
@@ -38,12 +49,17 @@ from tetra_drake.study.equilibrium import study_equilibrium
 
 SAMPLE_PERIOD = 5e-3
 """Time (s) between samples of simulated motion. Cubic curves join the samples."""
-OFFSETS = 41
-"""Number of offsets of a clock that are tried before the best one is refined."""
+OFFSETS, APART = 41, 0.02
+"""Least number of offsets of a clock, and greatest difference (s) between them, that are tried
+before the best one is refined."""
 CLOCK_DIGITS = 1e-7
 """Tolerance (s) of the offset of a clock."""
 ROUNDING = 1e-6
 """Time (s) by which times in a log may be rounded."""
+DELAY = 0.1
+"""Time (s) by which a log with a clock of its own may begin before the simulation, or end after."""
+MARKERS, ALIKE = 3, 2.0
+"""Least number of markers that tell the frame of a log; factor of their size that is no error."""
 CUT = 0.05
 """Share of the duration of a command that may be missing at the end of a log."""
 LEAST, MOST = 1e-12, 1e12
@@ -60,6 +76,8 @@ class Prediction(NamedTuple):
     """Numbers (numbers,) in SI; NaN if there is none."""
     clock_offset: float = 0.0
     """Time (s) by which the clock of the measurement is ahead of the simulated time."""
+    notes: Sequence[str] = ()
+    """What was found besides: nodes of markers, frame, and offsets of markers."""
 
 
 @dataclass(frozen=True)
@@ -72,11 +90,13 @@ class Measured:
     list; measured; uncertainty, its standard deviation."""
     predict: Callable[[Sequence[Scenario]], list[Prediction]]
     """What scenarios predict; NaN if a scenario cannot be simulated."""
+    has_notes: bool = False
+    """Whether predictions have notes."""
 
 
 class MotionCapture(Section):
-    """Measurement of a robot in motion, for a fit: a log of node positions over time in the world
-    frame, as a motion capture records them.
+    """Measurement of a robot in motion, for a fit: a log of the positions of markers on nodes over
+    time, as a motion capture records them.
 
         >>> td.MotionCapture(log="lab/log.csv", command="lab/command.csv", uncertainty=2e-4)
 
@@ -85,15 +105,27 @@ class MotionCapture(Section):
 
     log: str
     """CSV or Parquet file: a column time_s and columns such as "n3 x_mm". An empty cell is a gap.
-    The log lasts as long as the command, or as the simulation if it is shorter."""
+    The log lasts as long as the command, or as the simulation if it is shorter. Markers whose names
+    are no nodes are matched with nodes by their places at the start."""
     command: str | None = None
     """File of the commands that the robot followed."""
     gait: str | None = None
     """File of the gait that the robot walked with, in place of a command."""
     uncertainty: Annotated[Length, _UNCERTAINTY]
     """Standard deviation of a coordinate."""
-    clock: Time = Field(default=0.0, ge=0)
-    """Largest offset between the clocks of log and command. A fit finds the offset; 0 for none."""
+    clock: Annotated[Time, Field(ge=0)] | None = None
+    """Largest offset between the clocks of log and command. A fit finds the offset; 0 for none. If
+    not given, any is found if the log is not within the simulated time; otherwise there is none."""
+    origin: Position | None = None
+    """Position of the model's origin in the log. If neither it nor `turn` is given, a fit finds
+    both, from three markers on; otherwise they are 0."""
+    turn: Annotated[list[Angle], Field(min_length=3, max_length=3)] | None = None
+    """Angles of the model in the log: about x, the turned y and z. -90 degrees about x: y is up."""
+    markers: Keyed[str, str] = Field(default={})
+    """Nodes by the names of markers."""
+    marker_offset: Annotated[Length, Field(ge=0, le=MOST)] = 0.0
+    """Standard deviation of a marker's place beside its node along the axes of its body. A fit
+    finds such offsets; 0 for none."""
 
     def read(self, scenario: Scenario, name: str) -> Measured:
         """Reads the log: the measured coordinates, and a function that predicts them. `name` is the
@@ -106,13 +138,15 @@ class MotionCapture(Section):
             driver: Driver = load_command(self.command, scenario)
         else:
             driver = load_gait(str(self.gait), scenario)
-        nodes = Robot.of(scenario).structure.node_names
-        table = _log(self.log, nodes)
-        found, duration = table.index[-1] - table.index[0], scenario.simulation.duration
-        if found > duration + ROUNDING:
-            expected = f"expected at most the duration, {duration:g}"
-            problem = f"found {found:g} s, {expected} s; give simulation.duration more"
-            raise InputError(self.log, TIME_S, problem)
+        structure = Robot.of(scenario).structure
+        table = _log(self.log, [*structure.node_names, *self.markers])
+        (first, last), duration = table.index[[0, -1]], scenario.simulation.duration
+        found, slack = last - first, ROUNDING + (self.clock or 0.0)
+        is_outside = first < -slack or last > duration + slack
+        if found > duration + ROUNDING or (is_outside and self.clock is not None):
+            problem = f"found {first:.12g} to {last:.12g} s, expected 0 to {duration:g} s"
+            remedy = "give simulation.duration more" if found > duration else "leave out `clock`"
+            raise InputError(self.log, TIME_S, f"{problem}; {remedy}")
         least = 0.0
         if isinstance(driver, Command):
             least = min(duration, driver.period * (len(driver.samples) - 1))
@@ -120,59 +154,130 @@ class MotionCapture(Section):
             expected = f"expected at least the command's {least:g} s"
             problem = f"found {found:g} s, {expected}; give simulation.duration less to fit a part"
             raise InputError(self.log, TIME_S, problem)
+        table, note = self._named(table, structure)
         row, column = np.nonzero(np.isfinite(table.to_numpy()))
+        offsets = [f"{x[:-1]}offset {x[-1]}" for x in table if self.marker_offset]
+        none = [0.0] * len(offsets)
         numbers = {
-            "label": table.columns.to_numpy()[column],
-            "along": table.index.to_numpy()[row],
-            "measured": table.to_numpy()[row, column],
-            "uncertainty": self.uncertainty,
+            "label": [*table.columns[column], *offsets],
+            "along": [*table.index[row], *none],
+            "measured": [*table.to_numpy()[row, column], *none],
+            "uncertainty": [self.uncertainty] * len(row) + [self.marker_offset] * len(offsets),
         }
-        predict = functools.partial(self.predict, driver=driver, log=table)
-        return Measured(f"{name}, {Path(self.log).name}", pandas.DataFrame(numbers), predict)
+        predict = functools.partial(self.predict, driver=driver, log=table, note=note)
+        return Measured(f"{name}, {Path(self.log).name}", pandas.DataFrame(numbers), predict, True)
+
+    def _named(self, log: pandas.DataFrame, structure: Structure) -> tuple[pandas.DataFrame, str]:
+        """The log with all coordinates of its nodes as columns, and a text that says which nodes
+        unnamed markers are by their places at the start. Raises InputError if one is doubtful."""
+        from tetra_drake.study.placement import matches
+
+        nodes, names = structure.node_names, [*dict.fromkeys(name[:-2] for name in log)]
+        found = {name: self.markers.get(name, name) for name in names}
+        for marker, node in self.markers.items():
+            if node not in nodes or marker not in names or [*found.values()].count(node) > 1:
+                problem = f"found {node}, expected a node of its own for a marker of the log"
+                raise InputError(self.log, f"markers.{marker}", problem)
+        unnamed = [name for name in names if found[name] not in nodes]
+        log = log.reindex(columns=_coordinates(names))
+        whole = np.isfinite(_by_node(log)).all(axis=2)
+        used = np.flatnonzero(whole.any(axis=0))
+        row, labels = whole[:, used].all(axis=1).argmax(), [names[place] for place in used]
+        p_WN, seen = node_positions(structure, structure.initial_state), _by_node(log)[row, used]
+        is_seen, choices = len(used) >= MARKERS and whole[row, used].all(), []
+        if unnamed and is_seen and {*unnamed} <= {*labels} and len(used) <= len(nodes):
+            may_be = np.array([np.isin(nodes, found[label]) for label in labels])
+            may_be[~may_be.any(axis=1)] = ~np.isin(nodes, [*found.values()])
+            choices = matches(p_WN, seen, may_be, self.uncertainty)
+        for name in unnamed:
+            places = {nodes[choice[labels.index(name)]] for choice in choices}
+            if len(places) != 1:
+                alike = " or ".join(sorted(places)) or "none"
+                problem = f"is no node; by its place at the start it may be {alike}"
+                raise InputError(self.log, name, f"{problem}; name its node in `markers`")
+            found[name] = places.pop()
+        if is_seen:
+            p_WN = p_WN[[nodes.index(found[label]) for label in labels]]
+            ratio = math.sqrt(seen.var(axis=0).sum() / p_WN.var(axis=0).sum())
+            if not 1.0 / ALIKE < ratio < ALIKE:
+                problem = f"found markers {ratio:.3g} times as far apart as their nodes"
+                raise InputError(self.log, "", f"{problem}, expected another unit")
+        note = ", ".join(f"{name} is {found[name]}" for name in unnamed)
+        return log.set_axis(_coordinates([*found.values()]), axis="columns"), note
 
     def predict(
-        self, scenarios: Sequence[Scenario], *, driver: Driver, log: pandas.DataFrame
+        self, scenarios: Sequence[Scenario], *, driver: Driver, log: pandas.DataFrame, note: str
     ) -> list[Prediction]:
         """Predictions of the coordinates in a log, one Prediction per scenario, by simulation.
 
         `log` is the table of measured coordinates (m), with times (s) as index. `driver` is the
-        command or the gait that moves the robot. If `clock` allows it, the offset of the log's
-        clock is the one that fits the log best.
+        command or the gait that moves the robot. What settings leave open of the log's clock, its
+        frame and the places of its markers is what fits the log best; `note` is told with it.
         """
         often = {"simulation.sample_period": SAMPLE_PERIOD}
         finely = [each.with_numbers(often) for each in scenarios]
         outcomes = simulate_many(finely, [driver] * len(finely), record=True)
-        return [self._prediction(outcome, log) for outcome in outcomes]
+        return [self._prediction(outcome, log, note) for outcome in outcomes]
 
-    def _prediction(self, outcome: Outcome, log: pandas.DataFrame) -> Prediction:
+    def _prediction(self, outcome: Outcome, log: pandas.DataFrame, note: str) -> Prediction:
         from scipy.interpolate import CubicHermiteSpline
         from scipy.optimize import minimize_scalar
+        from scipy.spatial.transform import Rotation
 
-        is_there = np.isfinite(log.to_numpy())
-        measured = log.to_numpy()[is_there]
+        from tetra_drake.study.placement import Frame, aligned, aligned_with_offsets
+
+        measured, first = _by_node(log), log.index[0]
+        times, is_there = log.index.to_numpy() - first, np.isfinite(measured)
+        whole, offsets = is_there.all(axis=2), np.zeros((0, 3))
         if isinstance(outcome, SimulationFailure):
-            return Prediction(np.full(measured.size, np.nan))
-        moved = outcome.trajectory
-        places = [_coordinates(moved.node.values).index(name) for name in log]
-        p, v = (each.values.reshape(len(each), -1) for each in (moved.p_WN, moved.v_WN))
-        curves = CubicHermiteSpline(moved.time.values, p[:, places], v[:, places])
+            return Prediction(
+                np.full(is_there.sum() + measured[0].size * bool(self.marker_offset), np.nan)
+            )
+        moved, structure, names = outcome.trajectory, outcome.robot.structure, log.columns[::3]
+        nodes = [structure.node_names.index(name[:-2]) for name in names]
+        p, v = (each.values[:, nodes] for each in (moved.p_WN, moved.v_WN))
+        curves, end = CubicHermiteSpline(moved.time.values, p, v), float(moved.time[-1])
+        is_free = self.origin is self.turn is None and whole.any(axis=0).sum() >= MARKERS
+        turn = Rotation.from_euler("XYZ", self.turn or np.zeros(3)).as_matrix()
+        known = turn, np.array(self.origin or np.zeros(3))
 
-        def numbers(offset: float) -> np.ndarray:
+        def placed(shift: float) -> tuple[np.ndarray, Frame]:
             # The robot stands still before and after the simulation.
-            times = np.clip(log.index.to_numpy() - offset, curves.x[0], curves.x[-1])
-            return np.asarray(curves(times)[is_there])
+            p = curves(np.clip(times - shift, 0.0, end))
+            return p, aligned(p[whole], measured[whole]) if is_free else known
 
-        def misfit(offset: float) -> float:
-            return float(((numbers(offset) - measured) ** 2).sum())
+        def misfit(shift: float) -> float:
+            p, (turn, origin) = placed(shift)
+            return float(((p @ turn.T + origin - measured)[is_there] ** 2).sum())
 
-        if not self.clock:
-            return Prediction(numbers(0.0))
-        tried = np.linspace(-self.clock, self.clock, OFFSETS)
-        nearest = tried[np.argmin([misfit(each) for each in tried])]
-        step = tried[1] - tried[0]
-        bounds = max(nearest - step, -self.clock), min(nearest + step, self.clock)
-        best = minimize_scalar(misfit, bounds=bounds, options={"xatol": CLOCK_DIGITS})
-        return Prediction(numbers(float(best.x)), float(best.x))
+        shift, slack = -first, self.clock or 0.0
+        low, high = shift - slack, shift + slack
+        if self.clock is None and not -ROUNDING <= first <= log.index[-1] <= end + ROUNDING:
+            low, high = times[-1] - end - DELAY, DELAY
+        if low < high:
+            tried = np.linspace(low, high, max(OFFSETS, math.ceil((high - low) / APART)))
+            nearest, step = tried[np.argmin([misfit(each) for each in tried])], tried[1] - tried[0]
+            bounds = max(nearest - step, low), min(nearest + step, high)
+            shift = minimize_scalar(misfit, bounds=bounds, options={"xatol": CLOCK_DIGITS}).x
+        (p, frame), notes = placed(shift), [note] * bool(note)
+        if self.marker_offset:
+            q_WB = moved.q_WB.values[np.searchsorted(curves.x[:-1], times - shift)]
+            R_WB = Rotation.from_quat(np.roll(q_WB, -1, axis=2).reshape(-1, 4)).as_matrix()
+            R = R_WB.reshape(*q_WB.shape[:2], 3, 3)[:, structure.carriers[nodes]]
+            R[:, structure.carriers[nodes] == WORLD] = np.eye(3)
+            share = self.uncertainty / self.marker_offset
+            frame, offsets = aligned_with_offsets(p, R, measured, frame, share, is_free=is_free)
+            p = p + np.einsum("tnij,nj->tni", R, offsets)
+            beside = zip(names, 1e3 * np.linalg.norm(offsets, axis=1), strict=True)
+            notes += [f"the marker of {x[:-2]} is {mm:.1f} mm beside it" for x, mm in beside]
+        turn, origin = frame
+        if is_free:
+            place = ", ".join(f"{fixed(1e3 * each, 1)} mm" for each in origin)
+            angles = Rotation.from_matrix(turn).as_euler("XYZ", degrees=True)
+            angle = ", ".join(f"{fixed(each)} deg" for each in angles)
+            notes.append(f"the frame has origin: [{place}], turn: [{angle}]")
+        values = np.append((p @ turn.T + origin)[is_there], offsets)
+        return Prediction(values, float(shift + first), notes)
 
 
 class Rest(Section):
@@ -282,10 +387,15 @@ def _coordinates(nodes: Sequence[str]) -> list[str]:
     return [f"{node} {axis}" for node in nodes for axis in "xyz"]
 
 
+def _by_node(log: pandas.DataFrame) -> np.ndarray:
+    """Positions (times, nodes, 3) in m of a log with the columns of _coordinates()."""
+    return log.to_numpy().reshape(len(log), -1, 3)
+
+
 def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
     """Reads a log file (CSV or Parquet): a table of coordinates (m) with times (s) as index and
-    columns such as "n3 z"; NaN in gaps. `nodes` are the names that it may use. Raises InputError,
-    naming line or column, if the log is wrong."""
+    columns such as "n3 z"; NaN in gaps. Names besides `nodes` need all three coordinates. Raises
+    InputError, naming line or column, if the log is wrong."""
     if path.endswith(".parquet"):
         try:
             stored = pandas.read_parquet(io.BytesIO(read_bytes(path, "log")))
@@ -310,7 +420,7 @@ def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
             expected = f"expected node, axis and unit, such as '{nodes[0]} x_mm'"
             raise InputError(path, name, f"is no column of a log; {expected}")
         coordinate, node, unit = match.groups()
-        if node not in nodes:
+        if node not in nodes and not {f"{node} {axis}_{unit}" for axis in "xyz"} <= set(cells):
             raise InputError(path, name, f"found unknown node '{node}'; {hint(node, nodes)}")
         scale = given_quantity(f"1 {unit}", "m", path, name)
         columns[coordinate] = scale * column_numbers(cells[name], path, gaps=True)
