@@ -52,16 +52,14 @@ def merged(base: Any, changes: Any, key: str = "", *, section: Any = None) -> An
                 raise InputError("changes", inner, f"found no such item in a list of {len(items)}")
             items[index] = merged(items[index], value, inner)
         return items
-    parts = section if isinstance(section, dict) else getattr(section, "__dict__", {})
-    removed = [
-        n for n, value in changes.items() if value is None and section is parts and n in parts
-    ]
-    is_part = removed or isinstance(changes, Part)
-    is_whole = TAG in changes or (key in REPLACED and not is_part)
+    parts = {} if TAG in changes else getattr(section, "__dict__", section or {})
+    named = parts if parts is section else {}  # the names of a map, which are no keys of a section
+    removed = [name for name, value in changes.items() if value is None and name in named]
+    is_whole = TAG in changes or (key in REPLACED and not (removed or isinstance(changes, Part)))
     tree = dict(base) if isinstance(base, dict) and not is_whole else {}
     for name, value in changes.items():
-        part = None if is_whole else parts.get(name)
-        tree[name] = merged(tree.get(name), value, joined(key, str(name)), section=part)
+        inner = joined(key, str(name))
+        tree[name] = merged(tree.get(name), value, inner, section=parts.get(name))
     return {name: value for name, value in tree.items() if name not in removed}
 
 

@@ -58,10 +58,8 @@ def schema_text(*, structure: bool = False) -> str:
             node.pop("required", None)  # a base may have the keys
             own = {} if id(node) in sections else node.get("properties", {})
             for value in (node.get("additionalProperties") or {}, *own.values()):
-                if isinstance(value.get("type"), str):
-                    value["type"] = [value["type"], "null"]  # removes a name of the base
-                elif "null" not in value.get("type", ["null"]):
-                    value["type"] = [*value["type"], "null"]
+                if "null" not in (kinds := value.get("type", "null")):  # null removes a name
+                    value["type"] = [*([kinds] if isinstance(kinds, str) else kinds), "null"]
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 

@@ -146,10 +146,8 @@ PLUS_MINUS = r"(?:±|\+/-)"
 """Regular expression of what stands between a quantity and its tolerance."""
 OTHER_SIGNS = r"^\s*[-+−\d.].*[^\x00-\x7F]"
 """Regular expression of texts that are perhaps quantities by plain()."""
-_SIGNS = str.maketrans("·⋅∙×−∕⁄μ", "****-//u") | {ord("°"): "deg", ord("Å"): "angstrom"}
-_RAISED = re.compile("[⁺⁻]?[⁰¹²³⁴-⁹]+")
-_TENS = re.compile(r"\s*[×·⋅]\s*10(\^|\*\*)")
 
+_SIGNS = str.maketrans("·⋅∙×−∕⁄μ", "****-//u") | {ord("°"): "deg", ord("Å"): "angstrom"}
 _AMBIGUOUS = {"gr": "g or grain", "ton": "t (1000 kg) or 2000 lb", "cwt": "100 lb or 112 lb"}
 _AMBIGUOUS |= {"mil": "thou, mm or mrad", "pond": "gf or lbf", "grade?": "deg or gon"}
 _AMBIGUOUS |= {"Ns": "N or N*s", "lbfs": "lbf or lbf*s"}
@@ -157,18 +155,17 @@ _AMBIGUOUS |= {"Ns": "N or N*s", "lbfs": "lbf or lbf*s"}
 
 
 def plain(text: str) -> str:
-    """A quantity in ASCII. It may have the signs that editors, people and Pint write: "1.5×10³
-    N·m⁻¹" becomes "1.5e3 N*m^-1"."""
-    powers = unicodedata.normalize("NFKC", _RAISED.sub(r"^\g<0>", text))
-    return _TENS.sub("e", powers).translate(_SIGNS)
+    """A quantity in ASCII, such as "1.5e3 N*m^-1" for "1.5×10³ N·m⁻¹"."""
+    powers = unicodedata.normalize("NFKC", re.sub("[⁺⁻]?[⁰¹²³⁴-⁹]+", r"^\g<0>", text))
+    return re.sub(r"\s*[×·⋅]\s*10(\^|\*\*)", "e", powers).translate(_SIGNS)
 
 
 @functools.lru_cache(maxsize=1000)  # a base is read again for each file
 def quantity_to_si(text: str, unit: str) -> float:
     """Reads a quantity such as "25 lbf/in", or "1 /in", as a number in the SI unit `unit` ("N/m").
 
-    Raises ValueError if the text is no quantity, has another dimension, is beyond 1e15, or has a
-    name of a unit with two meanings. Angle is a dimension: Hz are no rad/s.
+    Raises ValueError if the text is no quantity, has another dimension (angle is one), is beyond
+    1e15, or has a name of a unit with two meanings.
     """
     import pint
 
@@ -182,9 +179,7 @@ def quantity_to_si(text: str, unit: str) -> float:
     try:
         given = f"1/{match[3]}" if match[2] else match[3]
         found = pint.Quantity(float(match[1]), given)
-        if not (
-            found / pint.Quantity(1.0, unit)
-        ).unitless:  # radians have no dimension, but are a unit
+        if not (found / pint.Quantity(1.0, unit)).unitless:  # angles are units without dimension
             raise pint.DimensionalityError(found.units, unit)
         number = float(found.to(unit).magnitude)
     except pint.DimensionalityError as error:
