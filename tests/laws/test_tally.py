@@ -111,12 +111,13 @@ def test_nothing_counts_before_the_steady_stretch():
     tally = tallied(lengths=WOUND, begins=3.0, **EFFORT)
     # The last step, in which 0.2 m are paid out at 4 N.
     assert effort_of(tally) == pytest.approx([4.0, 0.2, 0.0, 4.0, 0.2, 0.0, 0.0])
-    # Neither does the jump of a force at its first instant, which ends a step of no duration.
-    jump = {
-        "times": np.array([0.0, 3.0, 3.0, 4.0]),
-        "tensions": [[5.0, 0], [5.0, 0], [99.0, 0], [6.0, 0]],
-    }
-    assert effort_of(tallied(begins=3.0, **jump))[0] == 6.0
+    # Neither does a force that jumps as the stretch begins: at once, and for less than 1 ms.
+    jump = {"times": np.array([0.0, 3.0, 3.0, 3.0009, 4.0])}
+    jump |= {"tensions": np.array([[5.0, 0.0], [5.0, 0.0], [99.0, 0.0], [50.0, 0.0], [6.0, 0.0]])}
+    jump |= {"lengths": np.array([1.0, 1.0, 1.0, 0.9, 0.8])}
+    speed = 0.1 / 0.9991
+    peaks = effort_of(tallied(begins=3.0, **jump))[:3]
+    assert peaks == pytest.approx([6.0, speed, 6.0 * speed])
 
 
 @pytest.mark.parametrize(

@@ -24,11 +24,15 @@ from tetra_drake.laws.kinematics import pitch_rate
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.struts import least_strut_distance
 
+SET_IN = 1e-3
+"""Time (s) of the steady stretch before peaks count. The tension overshoots for less than this
+where signals set in, at the end of the start-up."""
+
 
 class Effort(NamedTuple):
     """Effort of the actuators in the steady stretch: the part of the walk from
     `simulation.steady_from` to the end. Integrals are summed over the actuators. Peaks are of each
-    driven cable."""
+    driven cable, without the first SET_IN."""
 
     left: Annotated[Table, "cables"]
     """Length of each driven cable that is not wound, at the latest step, in m."""
@@ -99,7 +103,7 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
     duration = time - tally.time[0]
     takes_time = duration > 0.0
     counts = takes_time & (tally.time[0] >= tally.begins[0])
-    counted = select(counts, duration, 0.0)
+    counted, settled = select(counts, duration, 0.0), time >= tally.begins[0] + SET_IN
     cable_forces, effort = forces.cable_forces, tally.effort
 
     per_time, work, drive = select(takes_time, 1.0 / duration, 0.0), 0.0 * duration, 0
@@ -113,7 +117,8 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
         drive += 1
         wound = select(counts, effort.left[i] - own.left, 0.0)
         effort.left[i] = own.left
-        speed, load = wound * per_time, select(counts, own.load, 0.0)
+        speed = select(settled, wound * per_time, 0.0)
+        load = select(counts & settled, own.load, 0.0)
         effort.peak_force[i] = maximum(effort.peak_force[i], load)
         effort.peak_speed[i] = maximum(effort.peak_speed[i], abs(speed))
         effort.peak_power[i] = maximum(effort.peak_power[i], load * speed)
