@@ -27,7 +27,7 @@ from records import append, read
 from tetra_drake.engines.planner import Planner
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.evolution.run import load_run
-from tetra_drake.figures.style import save_figure
+from tetra_drake.figures.style import OKABE_ITO, common_style, save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.results.result import SimulationResult
@@ -362,29 +362,36 @@ def cable_table(shares: pandas.DataFrame, plans: pandas.DataFrame) -> TextTable:
     return TextTable([*headings, "of the fastest", "trials", "planner"], rows)
 
 
+_PLANNER: Any = {"color": "black", "marker": "x", "linestyle": "", "markersize": 4.0}
+
+
+@common_style()
 def speed_figure(shares: pandas.DataFrame, plans: pandas.DataFrame) -> Figure:
     """Speed after damage and after trials by cable, and over the number of trials."""
     figure = Figure(figsize=(8.0, 4.6), layout="constrained")
+    old, found = OKABE_ITO["orange"], OKABE_ITO["blue"]
     by_cable, by_trial = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     names = [*dict.fromkeys(shares["group"])]
     for height, name in enumerate(reversed(names)):
         own = shares[shares["group"] == name]
-        for column, color, shift in (("lost", "C1", -0.15), ("found", "C0", 0.15)):
+        for column, color, shift in (("lost", old, -0.15), ("found", found, 0.15)):
             low, middle, high = (own[column].quantile(q) for q in (0.0, 0.5, 1.0))
             by_cable.hlines(height + shift, low, high, color=color, linewidth=1.5)
             by_cable.plot(middle, height + shift, "o", color=color, markersize=4.0)
         for share in plans[plans["group"] == name]["share"]:
-            by_cable.plot(share, height, "kx", markersize=4.0)
+            by_cable.plot(share, height, **_PLANNER)
     by_cable.set_yticks(range(len(names)), [*reversed(names)], fontsize="small")
-    labels = {"C1o-": "old gait", "C0o-": "after trials", "kx": "planner"}
-    for style, label in labels.items():
-        by_cable.plot([], [], style, markersize=4.0, label=label)
+    by_cable.plot([], [], "o-", color=old, markersize=4.0, label="old gait")
+    by_cable.plot([], [], "o-", color=found, markersize=4.0, label="after trials")
+    by_cable.plot([], [], **_PLANNER, label="planner")
     by_cable.legend(frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.4, 1.0))
     by_cable.set(xlabel="speed / speed before the damage")
+    by_cable.margins(x=0.03)
     counts = range(TRIALS + 1)
     quantiles = shares[[f"best{k}" for k in counts]].quantile([0.25, 0.5, 0.75]).to_numpy()
-    by_trial.fill_between(counts, quantiles[0], quantiles[2], alpha=0.25, linewidth=0.0)
-    by_trial.plot(counts, quantiles[1], "o-", markersize=4.0)
+    shade = {"color": found, "alpha": 0.25, "linewidth": 0.0}
+    by_trial.fill_between(counts, quantiles[0], quantiles[2], **shade)
+    by_trial.plot(counts, quantiles[1], "o-", color=found, markersize=4.0)
     by_trial.axhline(GOAL, color="black", linestyle="--", linewidth=0.8)
     by_trial.set(xlabel="trials", ylabel="median and quartiles", ylim=(0.0, 1.6))
     by_trial.set_xticks(range(0, TRIALS + 1, 2))

@@ -180,7 +180,7 @@ EXPERIMENTS = {
         film=True,
     ),
     "champion": Experiment(
-        "the farthest of the thesis's robot: a long search, where friction grows with the load",
+        "a long search for the thesis's robot, where friction grows with the load",
         "coulomb",
         _by(CmaEs(population=16, sample=100, starts=12), 3, 16000),
         film=True,

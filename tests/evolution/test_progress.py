@@ -18,7 +18,7 @@ def test_a_line_is_about_all_trials_and_shows_the_fittest_gait():
         Progress(stream).show(statuses)
     first, second = stream.getvalue().splitlines()
     assert first == "evaluations: 0 of 140"
-    for part in ("6.00", "5.00 in", "1 of 3 trials", "2 failed"):
+    for part in ("fitness 6.00", "5.00 in", "1 of 3 trials", "2 failed"):
         assert part in second
 
 

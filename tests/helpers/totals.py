@@ -9,7 +9,7 @@ from tetra_drake.laws.tally import Tally
 def make_totals(bodies: int = 5) -> Tally:
     """Tally of twelve steady seconds. Each tetrahedron is lifted one second longer than the one
     behind it; the struts are 1 cm apart."""
-    tally = allocate(Tally, {"signals": 4, "cables": 0, "bodies": bodies})
+    tally = allocate(Tally, {"signals": 4, "cables": 1, "bodies": bodies})
     numbers = {"peak_force": 4.0, "peak_speed": 0.2, "peak_power": 0.5, "work": 0.3}
     numbers |= {"impulse": 96.0, "wound": 4.8, "pulled": 24.0, "limited": 9.6}
     for name, number in numbers.items():

@@ -78,8 +78,8 @@ EFFORT = {
 WOUND = np.array([1.0, 0.9, 0.5, 0.7])
 """0.1 m in 1 s, 0.4 m in 2 s, then 0.2 m paid out."""
 
-PEAKS = [9.0, 0.2, 3.0 * 0.2]
-"""Of force (N), speed (m/s) and power (W) of an actuator."""
+PEAKS = [4.0, 0.2, 3.0 * 0.2]
+"""Of force (N), speed (m/s) and power (W) of an actuator, without the 9 N of the first instant."""
 
 SUMS = [1 * 2.0 + 2 * 3.0 + 1 * 4.0, 0.1 + 0.4 + 0.2, 2.0 * 0.1 + 3.0 * 0.4]
 """Of force by time (N s), of lengths wound (m), and of the work on them (J), without what is paid
@@ -107,15 +107,22 @@ def test_winches_wind_their_free_length_and_are_limited_for_a_time():
     assert tally.effort.work[0] == pytest.approx(1.4), "of the tension"
 
 
-def test_only_peaks_count_before_the_steady_stretch():
+def test_nothing_counts_before_the_steady_stretch():
     tally = tallied(lengths=WOUND, begins=3.0, **EFFORT)
     # The last step, in which 0.2 m are paid out at 4 N.
-    assert effort_of(tally) == pytest.approx([*PEAKS, 4.0, 0.2, 0.0, 0.0])
+    assert effort_of(tally) == pytest.approx([4.0, 0.2, 0.0, 4.0, 0.2, 0.0, 0.0])
+    # Neither does a force that jumps as the stretch begins: at once, and for less than 1 ms.
+    jump = {"times": np.array([0.0, 3.0, 3.0, 3.0009, 4.0])}
+    jump |= {"tensions": np.array([[5.0, 0.0], [5.0, 0.0], [99.0, 0.0], [50.0, 0.0], [6.0, 0.0]])}
+    jump |= {"lengths": np.array([1.0, 1.0, 1.0, 0.9, 0.8])}
+    speed = 0.1 / 0.9991
+    peaks = effort_of(tallied(begins=3.0, **jump))[:3]
+    assert peaks == pytest.approx([6.0, speed, 6.0 * speed])
 
 
 @pytest.mark.parametrize(
     ("lengths", "peaks"),
-    [(WOUND[::-1], [9.0, 0.2, 0.4]), (np.array([0.0, 0.1, 0.2, 0.9]), [9.0, 0.7, 0.0])],
+    [(WOUND[::-1], [4.0, 0.2, 0.4]), (np.array([0.0, 0.1, 0.2, 0.9]), [4.0, 0.7, 0.0])],
 )
 def test_a_peak_of_speed_counts_in_either_direction(lengths, peaks):
     assert effort_of(tallied(lengths=lengths, **EFFORT))[:3] == pytest.approx(peaks)

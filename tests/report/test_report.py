@@ -22,6 +22,8 @@ from tetra_drake.report.run_page import (
     simulate_shown_gaits,
     write_report,
 )
+from tetra_drake.report.summary import run_text
+from tetra_drake.results.result import headline
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
@@ -163,8 +165,17 @@ def test_gaits_of_a_run_with_disturbances_are_shown_undisturbed(tmp_path, study)
     scenario = tiny_scenario().with_changes(disturbed)
     shown = simulate_shown_gaits(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
     assert shown.best.result.metrics == study.best.result.metrics
-    (note,) = (text for text in render(shown).texts["p"] if "3 draws" in text)
-    assert f"{rounded(shown.best.result.metrics.distance_in)} in" in note
+    page = render(shown)
+    # The title tells the robot of the replay first, then the mean of the draws.
+    first, second = page.texts["h1"][0].split("; ")
+    assert first.endswith(headline(scenario, vars(shown.best.result.metrics)))
+    assert "3 draws" in second and second.endswith(headline(scenario, shown.best.recorded))
+    assert page.row("distance")[0].startswith(rounded(shown.best.result.metrics.distance_in))
+    assert page.row("mean of 3 draws")[0].startswith("2.00 in")
+    assert any("3 draws" in text for text in page.texts["p"])
+    assert headline(scenario, shown.best.recorded) in str(shown.run)
+    text = run_text(shown.run)
+    assert f"{rounded(shown.best.result.metrics.distance_in)} in, undisturbed" in text
 
 
 def test_the_commands_to_reproduce_it_are_commands(page):

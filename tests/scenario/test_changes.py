@@ -9,6 +9,8 @@ from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.yaml_text import parse_yaml
+from tetra_drake.settings.section import value_at
 
 
 def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
@@ -87,6 +89,82 @@ def test_a_key_with_nothing_is_an_empty_mapping_which_changes_nothing(load_text,
     assert robust.with_changes({"disturbances": None}).disturbances is None
     with refused("scenario robust", "objective", "at least 1 item"):
         robust.with_changes({"objective": None})
+
+
+GUYED = """
+base: prism
+name: guyed
+robot: !Structure
+  file: prism
+  nodes: {mast: [0 m, 0 m, 0.5 m]}
+  cables:
+    guy: {pairs: [[mast, n3], [mast, n4]], stiffness: 50 N/m, damping: 1 N*s/m, free_length: 0.2 m}
+  anchors: {mast: xyz, n0: xyz}
+  masses: {n3: 20 g, n4: 30 g}
+  loads: {n4: [0 N, 0 N, -0.3 N]}
+disturbances: {draws: 2, spreads: {robot.cables.guy.stiffness: 0.1, ground.stiffness: 0.1}}
+"""
+
+DRIVEN = {"side_2": "n1 n4", "side_3": "n2 n5", "bottom_2": "n1 n2", "bottom_3": "n2 n0"}
+REMOVED = {
+    "robot: {anchors: {n0: null}}": ("robot.anchors", {"mast": "xyz"}),
+    "robot: {masses: {n3: }}": ("robot.masses", {"n4": 0.03}),
+    "robot: {loads: {n4: null}}": ("robot.loads", {}),
+    "disturbances: {spreads: {robot.cables.guy.stiffness: null}}": (
+        "disturbances.spreads",
+        {"ground.stiffness": 0.1},
+    ),
+    "objective: {speed: null, distance: 2 /m}": ("objective", {"distance": 2.0}),
+    "robot: {actuated: {side_1: null, bottom_1: null}}": (
+        "robot.actuated",
+        {name: [f"{name[:-2]} {ends}"] for name, ends in DRIVEN.items()},
+    ),
+}
+
+
+@pytest.mark.parametrize("text", REMOVED)
+def test_an_empty_key_removes_a_name_of_any_map_of_the_base(text, tmp_path):
+    key, left = REMOVED[text]
+    (tmp_path / "guyed.yaml").write_text(GUYED)
+    (tmp_path / "mine.yaml").write_text(f"base: guyed.yaml\n{text}\n")
+    found = load_scenario(tmp_path / "mine.yaml")
+    assert value_at(found.model_dump(), key) == left
+    changes = parse_yaml(text, "changes")
+    assert load_scenario(tmp_path / "guyed.yaml").with_changes(changes) == found
+
+
+def test_a_group_and_what_names_it_are_removed_together(tmp_path):
+    (tmp_path / "guyed.yaml").write_text(GUYED)
+    guyed = load_scenario(tmp_path / "guyed.yaml")
+    spreads = {"robot.cables.guy.stiffness": None}
+    changes = {
+        "robot": {"cables": {"guy": None}, "nodes": {"mast": None}, "anchors": {"mast": None}}
+    }
+    free = guyed.with_changes(changes | {"disturbances": {"spreads": spreads}})
+    assert [*free.robot.cables] == ["bottom", "top", "side"]
+    assert "mast" not in free.robot.nodes and [*free.robot.anchors] == ["n0"]
+    # The same in a file that names the structure's file, where the base is that file.
+    text = "base: prism\nrobot: !Structure {file: prism, actuated: {side_1: null}}\n"
+    (tmp_path / "prism.yaml").write_text(text)
+    assert next(iter(load_scenario(tmp_path / "prism.yaml").robot.actuated)) == "side_2"
+
+
+NOT_REMOVED = {"robot: {cables: {guys: null}}": "robot.cables.guys"}
+NOT_REMOVED |= {"robot: {masses: {n5: null}}": "robot.masses.n5"}
+NOT_REMOVED |= {
+    "disturbances: {spreads: {ground.stiff: null}}": "disturbances.spreads.ground.stiff"
+}
+NOT_REMOVED |= {"ground: {stiffness: null}": "ground.stiffness", "name: null": "name"}
+NOT_REMOVED |= {"robot: {cables: {guy: {stiffness: null}}}": "robot.cables.guy.stiffness"}
+NOT_REMOVED |= {"objective: {lead: null}": "objective.lead"}
+
+
+@pytest.mark.parametrize("text", NOT_REMOVED)
+def test_what_is_no_name_of_the_base_s_maps_is_not_removed(text, tmp_path, refused):
+    (tmp_path / "guyed.yaml").write_text(GUYED)
+    (tmp_path / "mine.yaml").write_text(f"base: guyed.yaml\n{text}\n")
+    with refused(str(tmp_path / "mine.yaml"), NOT_REMOVED[text]):
+        load_scenario(tmp_path / "mine.yaml")
 
 
 def test_a_mapping_of_free_keys_is_replaced_as_a_whole(scenario):

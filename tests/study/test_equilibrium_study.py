@@ -86,7 +86,13 @@ def test_the_page_shows_the_numbers_and_swings_in_the_lowest_modes(tmp_path):
     study = study_equilibrium("prism")
     save_structure_page(study, tmp_path / "prism.html")
     page = read_page(tmp_path / "prism.html")
-    assert structure_text(study).splitlines()[0] in page
+    text = structure_text(study)
+    assert text.splitlines()[0] in page
+    # Each list of frequencies says what holds the feet.
+    free, held = (
+        next(line for line in text.splitlines() if word in line) for word in ("Lowest", "Modes")
+    )
+    assert "free to slide" in free and study.robot.scenario.friction.text in held
     (film,) = re.findall(r"const recording = (.*);", page)
     film = json.loads(film)
     assert film["progress"]["values"][::75] == [*study.frequencies[:5], study.frequencies[4]]

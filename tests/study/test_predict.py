@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas
@@ -14,7 +15,7 @@ from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import parse_yaml
-from tetra_drake.study.predict import predict
+from tetra_drake.study.predict import predict, predictions_figure
 
 STIFFNESS, MASS = "robot.cables.line.stiffness", "robot.masses.b"
 WIDTH_90, BAR_MASS = 1.6449, math.pi * 0.004**2 * 0.2 * 1200.0
@@ -119,8 +120,30 @@ def test_draws_are_simulated_with_a_gait():
     changes = {"tolerances": {"ground.stiffness": "20 %"}, "simulation.duration": "1.6 s"}
     scenario = load_scenario("prism").with_changes(changes)
     measures = {"way": "distance", "own": lambda result: result.metrics.distance}
-    draws = predict(scenario, measures, gait=td.seeded_gait(scenario, 1), draws=8).draws
+    gait = td.seeded_gait(scenario, 1)
+    draws = predict(scenario, measures, gait=gait, draws=8).draws
     assert draws["way"].nunique() == 8 and draws["way"].equals(draws["own"])
+    # Quantities in motion and at rest together are those of each kind alone.
+    at_rest = ["frequency 1", "n3 z"]
+    both = predict(scenario, ["distance", *at_rest], gait=gait, draws=8).draws
+    assert both["distance"].equals(draws["way"].rename("distance"))
+    alone = predict(scenario, at_rest, draws=8).draws
+    np.testing.assert_allclose(both[at_rest], alone[at_rest], rtol=1e-6)
+
+
+def test_the_figure_shows_percent_of_the_nominal_value_or_nothing():
+    made = predict(hung(**{"masses": "2 % each"}), ["frequency 1", "tension line"], draws=8)
+    names = ["wide", "narrow", "zero"]
+    numbers = {"nominal": [0.57, -2.0, 0.0], "median": [0.9, -2.0, 0.0], "low": [0.5, -2.1, -1.0]}
+    numbers |= {"high": [1.9, -1.9, 1.0], "unit": "m", "draws": 8}
+    shares = made.shares.reindex(names)
+    made = replace(made, quantities=pandas.DataFrame(numbers, index=names), shares=shares)
+    panel = predictions_figure(made).axes[0]
+    zero, narrow, wide = panel.collections[0].get_segments()
+    assert wide[:, 0] == pytest.approx([100 * (0.5 / 0.57 - 1), 100 * (1.9 / 0.57 - 1)])
+    assert narrow[:, 0] == pytest.approx([-5.0, 5.0])
+    assert np.isnan(zero).any() or not len(zero), "an interval of 2 m about 0 is no share of it"
+    assert [text.get_position()[1] for text in panel.texts] == [0]
 
 
 @pytest.mark.parametrize(

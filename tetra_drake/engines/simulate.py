@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 from tetra_drake.engines.batch import Viewer
 from tetra_drake.engines.engine import check_can_be_watched, engine_of
@@ -19,7 +20,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 
-Outcome = SimulationResult | SimulationFailure
+Outcome: TypeAlias = SimulationResult | SimulationFailure
 """Result of a simulation, or its failure: Diverged or StepBudgetExceeded."""
 
 

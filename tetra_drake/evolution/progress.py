@@ -87,7 +87,7 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
         if fittest.iteration >= 0:
             units, fitness = fittest.units, rounded(fittest.best_fitness)
             distance = rounded(fittest.best_distance / units.length)
-            parts.append(f"best gait {distance} {units.length_name} (fitness {fitness})")
+            parts.append(f"best fitness {fitness} (its gait goes {distance} {units.length_name})")
         if len(statuses) > 1:
             parts.append(f"{ended} of {len(statuses)} trials finished")
         if failures:

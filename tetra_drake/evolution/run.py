@@ -81,7 +81,10 @@ class Run:
         if not self.best().empty:
             best = self.fittest()
             words = headline(self.scenario, best, self.spread_of(best))
-            lines.append(f"best gait: {gait_label(best)}, {words}")
+            draws = (
+                f", mean of {self.scenario.draw_count} draws" if self.scenario.disturbances else ""
+            )
+            lines.append(f"best gait: {gait_label(best)}, {words}{draws}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:

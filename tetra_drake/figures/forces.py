@@ -111,7 +111,8 @@ def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Draw
     along = "along x" if result.robot.ground.flat else "along the forward tangent"
     looks = {"normal force": _FIRST, f"friction {along}": _SECOND, "landing": _LANDING}
     legend_below(page, looks, Patch(color=SHADE, label="stance"))
-    return titled(page, "Forces of the ground")
+    start, stop = end.time.values[[0, -1]]
+    return titled(page, f"Forces of the ground, {start:.3g} to {stop:.3g} s")
 
 
 def _shown(result: SimulationResult, time: Span | None) -> xarray.Dataset:

@@ -87,14 +87,14 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
         _draw_signals(panels[0], trajectory, names, result.scenario.units)
     _draw_stance(panels[-2], stands, heights, named)
     _draw_speed(panels[-1], trajectory, result)
+    start, stop = trajectory.time.values[[0, -1]]
     if cycle is not None:
-        start, stop = trajectory.time.values[[0, -1]]
         marks = np.arange(end % period, stop, period)
         for panel in panels:
             panel.grid(visible=False, axis="x")
             for mark in marks[marks >= start]:
                 panel.axvline(mark, color="0.6", linewidth=0.7, linestyle=(0, (1, 2)))
-    return titled(page, title)
+    return titled(page, f"{title}, {start:.3g} to {stop:.3g} s")
 
 
 def _rows_of_names(names: Iterable[str]) -> float:

@@ -24,20 +24,24 @@ from tetra_drake.laws.kinematics import pitch_rate
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.struts import least_strut_distance
 
+SET_IN = 1e-3
+"""Time (s) of the steady stretch before peaks count. The tension overshoots for less than this
+where signals set in, at the end of the start-up."""
+
 
 class Effort(NamedTuple):
-    """Effort of the actuators. Integrals are summed over the actuators, and over the steady
-    stretch: the part of the walk from `simulation.steady_from` to the end. Peaks are over all
-    steps."""
+    """Effort of the actuators in the steady stretch: the part of the walk from
+    `simulation.steady_from` to the end. Integrals are summed over the actuators. Peaks are of each
+    driven cable, without the first SET_IN."""
 
     left: Annotated[Table, "cables"]
     """Length of each driven cable that is not wound, at the latest step, in m."""
-    peak_force: Annotated[Table, 1]
-    """Largest force that an actuator bore, in N; see actuator.Exertion.load."""
-    peak_speed: Annotated[Table, 1]
-    """Largest speed of an actuator in either direction, in m/s."""
-    peak_power: Annotated[Table, 1]
-    """Largest power of an actuator, in W."""
+    peak_force: Annotated[Table, "cables"]
+    """Largest force that the actuator bore, in N; see actuator.Exertion.load."""
+    peak_speed: Annotated[Table, "cables"]
+    """Largest speed of the actuator in either direction, in m/s."""
+    peak_power: Annotated[Table, "cables"]
+    """Largest power of the actuator, in W."""
     impulse: Annotated[Table, 1]
     """Integral of the actuators' load, in N s; see actuator.Exertion.load."""
     wound: Annotated[Table, 1]
@@ -99,7 +103,7 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
     duration = time - tally.time[0]
     takes_time = duration > 0.0
     counts = takes_time & (tally.time[0] >= tally.begins[0])
-    counted = select(counts, duration, 0.0)
+    counted, settled = select(counts, duration, 0.0), time >= tally.begins[0] + SET_IN
     cable_forces, effort = forces.cable_forces, tally.effort
 
     per_time, work, drive = select(takes_time, 1.0 / duration, 0.0), 0.0 * duration, 0
@@ -111,13 +115,13 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
         mean_signal = 0.5 * (tally.signals[driver] + signals[driver])
         own = exertion(robot.actuator, forces.drives, drive, tension, length, mean_signal)
         drive += 1
-        wound = select(takes_time, effort.left[i] - own.left, 0.0)
+        wound = select(counts, effort.left[i] - own.left, 0.0)
         effort.left[i] = own.left
-        speed = wound * per_time
-        effort.peak_force[0] = maximum(effort.peak_force[0], own.load)
-        effort.peak_speed[0] = maximum(effort.peak_speed[0], abs(speed))
-        effort.peak_power[0] = maximum(effort.peak_power[0], own.load * speed)
-        wound = select(counts, wound, 0.0)
+        speed = select(settled, wound * per_time, 0.0)
+        load = select(counts & settled, own.load, 0.0)
+        effort.peak_force[i] = maximum(effort.peak_force[i], load)
+        effort.peak_speed[i] = maximum(effort.peak_speed[i], abs(speed))
+        effort.peak_power[i] = maximum(effort.peak_power[i], load * speed)
         work += maximum(own.pull * wound, 0.0)
         effort.impulse[0] += counted * own.load
         effort.wound[0] += abs(wound)
@@ -195,10 +199,10 @@ def metric(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -
 
 
 def total(name: str) -> Callable[[Any], float]:
-    """Makes a function that reads one number from the tally of a Walk (the data of one simulation
-    for metrics). `name` is its path in Tally, such as "effort.work"."""
-    number = operator.attrgetter(name)
-    return lambda walk: number(walk.tally)[0]
+    """Makes a function that reads a number from the tally of a Walk (the data of one simulation for
+    metrics), the greatest of several. `name` is its path in Tally, such as "effort.work"."""
+    numbers = operator.attrgetter(name)
+    return lambda walk: max(numbers(walk.tally), default=0.0)
 
 
 def mean(name: str) -> Callable[[Any], float]:
@@ -248,20 +252,21 @@ class TalliedMetrics:
     tension: float = metric("N", "smallest of any cable", total("least_tension"), least=True)
     """Least tension of any cable at any time. Below 0 the cable would have to push."""
     peak_actuator_force: float = greatest(
-        "N", "at any time; a cable can pull a winch backward", total("effort.peak_force")
+        "N", "without the start; a cable can pull a winch backward", total("effort.peak_force")
     )
-    """Greatest load of an actuator at any time: the tension of its cable, without what the cable's
-    own spring exerts beside an actuator with limits. It exceeds the `max_force` of a winch while
-    the robot stretches the cable faster than the stalled winch pays out."""
+    """Greatest load of an actuator in the steady stretch: the tension of its cable, without what
+    the cable's own spring exerts beside an actuator with limits. It leaves out the start, where
+    signals that set in pull harder for less than a millisecond. It exceeds the `max_force` of a
+    winch while the robot stretches the cable faster than the stalled winch pays out."""
     mean_actuator_force: float = metric("N", "of all driven cables", mean("impulse"), is_cost=True)
     """Mean load of the actuators in the steady stretch."""
-    peak_actuator_speed: float = greatest("m/s", "at any time", total("effort.peak_speed"))
-    """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
-    for a winch, otherwise of the cable's length."""
+    peak_actuator_speed: float = greatest("m/s", "without the start", total("effort.peak_speed"))
+    """Greatest speed of an actuator in the steady stretch, winding or paying out: the rate of the
+    free length for a winch, otherwise of the cable's length."""
     mean_actuator_speed: float = metric("m/s", "winding or paying out", mean("wound"), is_cost=True)
     """Mean speed of the actuators in the steady stretch, winding or paying out."""
-    peak_actuator_power: float = greatest("W", "at any time", total("effort.peak_power"))
-    """Greatest product of an actuator's load and winding speed, at any time."""
+    peak_actuator_power: float = greatest("W", "without the start", total("effort.peak_power"))
+    """Greatest product of an actuator's load and winding speed in the steady stretch."""
     mean_actuator_power: float = greatest("W", "effort of an actuator", mean("pulled"))
     """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
     actuator_limited: float = greatest(

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas
-import xarray
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure, check_type
@@ -24,7 +23,6 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import GivenGait, given_gait, with_body
 from tetra_drake.robot.remarks import stillness_remark
-from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import length_rates
 from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
 
@@ -47,9 +45,9 @@ class Loads(NamedTuple):
     limited: np.ndarray
     """1 where a limit binds, otherwise 0 (times, driven cables); NaN without limits."""
     table: pandas.DataFrame
-    """A row per driven cable, with units in the names of the columns: peaks, and means over the
-    steady stretch. Limits that do not exist are NaN. Forces and lengths are as in
-    laws.actuator.Exertion."""
+    """A row per driven cable, with units in the names of the columns: peaks and means over the
+    steady stretch, as in the metrics; lengths over the whole motion. Limits that do not exist are
+    NaN. Forces and lengths are as in laws.actuator.Exertion."""
 
 
 def export(
@@ -92,7 +90,7 @@ def export(
     finely = scenario.with_numbers({"simulation.sample_period": 1.0 / (rate * refinement)})
     result = simulate(scenario=finely, gait=gait, record=True)
     robot, motion = result.robot, result.trajectory.isel(time=slice(None, None, refinement))
-    loads = actuator_loads(robot, result.trajectory)
+    loads = actuator_loads(result)
     # A policy acts at an instant; what it commands is there a moment later.
     first = 0 if scenario.policy is None else 1
     command = Command(gait.name, 1.0 / rate, loads.commands[first::refinement])
@@ -125,9 +123,10 @@ def export(
     return verdict
 
 
-def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
-    """Loads on the actuators in a simulated motion, from its recorded `trajectory`: forces, speeds,
-    travel and power of each driven cable, and at which times a limit of the actuator binds."""
+def actuator_loads(result: SimulationResult) -> Loads:
+    """Loads on the actuators in a simulation with a trajectory: forces, speeds, travel and power of
+    each driven cable, and at which times a limit of the actuator binds."""
+    robot, trajectory = result.robot, result.trajectory
     kind, constants = robot.scenario.actuation, robot.model.actuator
     cables, limits = robot.structure.cables[robot.driven], actuator.limits_of(constants)
     walk = trajectory.isel(cable=robot.driven)
@@ -153,15 +152,17 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
     power, steady = -load * rate, trajectory.time.values >= max(settling_time, start_up)
     # Means of tables are NaN without samples: a simulation may end before its steady stretch.
     work, time = (pandas.DataFrame(x[steady]) for x in (np.maximum(power, 0.0), limited))
+    assert result.tally  # the result is from a simulation
+    effort = result.tally.effort
     columns = {
-        "peak_force_N": load.max(axis=0),
+        "peak_force_N": effort.peak_force[robot.driven],
         "limit_of_force_N": limits.max_force,
-        "peak_speed_mm_per_s": 1e3 * np.abs(rate).max(axis=0),
+        "peak_speed_mm_per_s": 1e3 * effort.peak_speed[robot.driven],
         "limit_of_speed_mm_per_s": 1e3 * limits.max_speed,
         "travel_mm": 1e3 * np.ptp(left, axis=0),
         "least_length_mm": 1e3 * left.min(axis=0),
         "limit_of_length_mm": 1e3 * limits.least_length,
-        "peak_power_W": power.max(axis=0),
+        "peak_power_W": effort.peak_power[robot.driven],
         "limit_of_power_W": 0.25 * limits.max_force * limits.max_speed,  # at half limits
         "mean_power_W": work.mean().to_numpy(),
         "time_at_a_limit_percent": 100.0 * time.mean().to_numpy(),

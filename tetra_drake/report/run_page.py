@@ -295,11 +295,16 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
         if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
     ]
     spread = run.spread_of(best.recorded)
+    words = headline(scenario, best.recorded, spread)
+    if scenario.disturbances:
+        alone = headline(scenario, vars(best.result.metrics))
+        words = f"{alone}; mean of {scenario.draw_count} draws: {words}"
     return render(
         "report/report.html.jinja",
         shown=shown,
-        title=f"{scenario.name}: {headline(scenario, best.recorded, spread)}",
+        title=f"{scenario.name}: {words}",
         spread=spread,
+        steady=max(scenario.simulation.settling_time, scenario.cpg.start_up),
         still=stillness_remark(best.result.robot, best.recorded),
         pictures={
             part: [_embedded(picture, folder) for picture in drawn]

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.formatting import TextTable, fixed, rounded, sentence, uncertain
@@ -122,8 +123,10 @@ def ground_text(scenario: Scenario) -> str:
 
 def run_text(run: Run) -> str:
     """Text about a run, printed at its end: main results, tables of trials and metrics, and paths
-    of the pages."""
-    texts = [TextTable(["", ""], results(run), text_columns=(0, 1)).text().strip("\n")]
+    of the pages. With disturbances, simulates the best gait without them."""
+    is_alone = run.scenario.disturbances and not run.best().empty
+    alone = simulate(run.scenario, run.best_gait()) if is_alone else None
+    texts = [TextTable(["", ""], results(run, alone), text_columns=(0, 1)).text().strip("\n")]
     if not run.best().empty:
         if len(run.statuses) > 1:
             texts.append(trials_table(run).text())
@@ -139,11 +142,11 @@ def run_text(run: Run) -> str:
     return "\n\n".join(texts)
 
 
-def results(run: Run) -> list[tuple[str, str]]:
+def results(run: Run, alone: SimulationResult | None = None) -> list[tuple[str, str]]:
     """The main results of a run: names and values with units.
 
     Gaits are described by the main metric of the objective, such as the distance. The best gait is
-    the fittest.
+    the fittest. `alone` is its simulation without the disturbances of the run, if there are some.
     """
     table, best = run.evaluations, run.best()
     failures = table["failure"].notna().sum()
@@ -163,8 +166,11 @@ def results(run: Run) -> list[tuple[str, str]]:
 
     least, most = (x / size for x in run.spread_of(fittest).get(name, (math.nan, math.nan)))
     shown = uncertain(rounded(fittest[name] / size), fittest[name] / size, least, most)
+    title, own = name.replace("_", " "), f"{shown} {unit}".rstrip() + f", {gait_label(fittest)}"
+    of_draws = [(title, f"{three(getattr(alone.metrics, name))}, undisturbed")] if alone else []
     rows = [
-        (name.replace("_", " "), f"{shown} {unit}".rstrip() + f", {gait_label(fittest)}"),
+        *of_draws,
+        (f"mean of {run.scenario.draw_count} draws" if of_draws else title, own),
         ("best initial gait", f"{three(initial[name])}, {gait_label(initial)}"),
         *_body_of_best(run),
     ]

@@ -84,6 +84,8 @@ class SimulationResult:
     """Data of the trajectory (see results.trajectory.make_dataset); None if it was not recorded."""
     spread: MetricRanges = field(default_factory=dict, repr=False, compare=False)
     """Ranges of the metrics for moved starts, as spread() gives them; empty if not simulated."""
+    tally: Tally | None = field(default=None, repr=False, compare=False)
+    """Sums and extremes over all steps; None for a result from a file."""
 
     def __str__(self) -> str:
         kept = "not recorded" if self.recorded is None else "recorded"
@@ -230,6 +232,7 @@ def make_result(
         engine=robot.scenario.engine_name,
         path=path,
         recorded=make_dataset(robot, motion.at(samples)) if record else None,
+        tally=totals,
     )
 
 

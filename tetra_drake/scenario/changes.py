@@ -23,18 +23,20 @@ class Part(Tree):
     lists, which an ordinary mapping or list replaces as a whole."""
 
 
-def merged(base: Any, changes: Any, key: str = "") -> Any:
+def merged(base: Any, changes: Any, key: str = "", *, section: Any = None) -> Any:
     """Returns the settings `base` of a scenario with changes; `base` itself stays as it is.
 
     Both are nested mappings, or the values in them at the dotted `key` ("" for the whole scenario).
-    Raises InputError for an index that a list does not have. The rules are:
+    `section` is the base as a checked section; without it no names are removed. Raises InputError
+    for an index that a list does not have. The rules are:
 
     - A mapping changes the keys that it names; the others stay. An empty key, as in `friction:`,
       changes nothing; `disturbances:` or `policy:` removes the section.
+    - In a map, whose names the user chooses, an empty key removes its name: `cables: {net: null}`.
     - A mapping with a tag, such as `!Coulomb`, replaces the mapping of the base and all its keys.
       Without a tag it changes keys.
-    - `objective`, `require`, `evolve` and `robot.actuated` are replaced as a whole. Only dotted
-      keys from Python, such as "objective.speed", change single keys of them.
+    - `objective`, `require`, `evolve` and `robot.actuated` are replaced as a whole, unless a name
+      is removed. Dotted keys from Python, such as "objective.speed", change single keys of them.
     - Numbers, texts, lists, and sections from Python replace the base's value. Only keys from
       Python, such as "robot.loads.n3[2]", change an item of a list.
     """
@@ -50,11 +52,15 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
                 raise InputError("changes", inner, f"found no such item in a list of {len(items)}")
             items[index] = merged(items[index], value, inner)
         return items
-    is_whole = TAG in changes or (key in REPLACED and not isinstance(changes, Part))
+    parts = {} if TAG in changes else getattr(section, "__dict__", section or {})
+    named = parts if parts is section else {}  # the names of a map, which are no keys of a section
+    removed = [name for name, value in changes.items() if value is None and name in named]
+    is_whole = TAG in changes or (key in REPLACED and not (removed or isinstance(changes, Part)))
     tree = dict(base) if isinstance(base, dict) and not is_whole else {}
     for name, value in changes.items():
-        tree[name] = merged(tree.get(name), value, joined(key, str(name)))
-    return tree
+        inner = joined(key, str(name))
+        tree[name] = merged(tree.get(name), value, inner, section=parts.get(name))
+    return {name: value for name, value in tree.items() if name not in removed}
 
 
 def given_changes(changes: Mapping[str, Any], source: object) -> Mapping[str, Any]:

@@ -52,9 +52,14 @@ def schema_text(*, structure: bool = False) -> str:
     schema: Tree = {"$id": f"urn:tetra-drake:{what}:format-{FORMAT}.schema.json"}
     schema |= (StructureFile if structure else Scenario).model_json_schema()
     schema["properties"].pop("file", None)  # a scenario's key, which names the structure's file
-    for node in parts_in(schema):
-        if not structure and isinstance(node, dict):
+    sections = [id(section) for section in (schema, *schema.get("$defs", {}).values())]
+    for node in parts_in({} if structure else schema):
+        if isinstance(node, dict):
             node.pop("required", None)  # a base may have the keys
+            own = {} if id(node) in sections else node.get("properties", {})
+            for value in (node.get("additionalProperties") or {}, *own.values()):
+                if "null" not in (kinds := value.get("type", "null")):  # null removes a name
+                    value["type"] = [*([kinds] if isinstance(kinds, str) else kinds), "null"]
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 

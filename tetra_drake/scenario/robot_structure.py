@@ -461,7 +461,7 @@ class StructureFile(RobotSettings):
         for kind in ("struts", "cables"):
             given = tree.get(kind)
             groups = given.items() if isinstance(given, dict) else ()
-            mappings = [(str(name), group) for name, group in groups if isinstance(group, dict)]
+            mappings = [(str(n), x or {}) for n, x in groups if isinstance(x, dict | None)]
             whole = [name for name, group in mappings if "pairs" in group]
             for name, group in mappings:
                 if "pairs" not in group:

@@ -283,7 +283,7 @@ class Scenario(Section):
         that names `source`, such as the file, and key.
         """
         changes = with_structure(changes, source)
-        tree = merged(self.model_dump(), changes)
+        tree = merged(self.model_dump(), changes, section=self)
         changed = self.from_tree(tree, source)
         robot = changes.get("robot")
         implied = isinstance(robot, dict) and changed.robot.implied_changes(self.robot, robot)

@@ -92,8 +92,8 @@ def with_structure(tree: Tree, source: object) -> Tree:
         raise InputError(source, "robot.file", f"{described(name)}: {problem}")
     file = structure_file(name, Path())
     content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
-    _structure(content, file)
-    return tree | {"robot": {TAG: _KIND} | merged(content, changes, "robot")}
+    section = _structure(content, file)
+    return tree | {"robot": {TAG: _KIND} | merged(content, changes, "robot", section=section)}
 
 
 def _structure(content: Any, file: Path) -> StructureFile:

@@ -19,7 +19,7 @@ from tetra_drake.scenario.common_sections import different_keys, separate
 from tetra_drake.settings.quantities import Keyed, Quantity
 from tetra_drake.settings.refusals import Tree, hint, joined, refuse
 from tetra_drake.settings.section import Section, tree_value, value_at
-from tetra_drake.settings.units import PATTERN, PLUS_MINUS, quantity_to_si
+from tetra_drake.settings.units import PATTERN, PLUS_MINUS, plain, quantity_to_si
 
 _SHORT = rf"\s*{PLUS_MINUS}?\s*(.+?)((?:\s+(?:normal|uniform|each))*)\s*"
 """Regular expression of a tolerance as one text, such as "± 2 % uniform each"."""
@@ -190,7 +190,7 @@ def split_tolerances(tree: Any) -> Any:
             return {name: without(item, joined(key, str(name))) for name, item in value.items()}
         if isinstance(value, list):
             return [without(item, f"{key}[{place}]") for place, item in enumerate(value)]
-        match = _WITH_TOLERANCE.fullmatch(value) if type(value) is str else None
+        match = _WITH_TOLERANCE.fullmatch(plain(value)) if type(value) is str else None
         if match is None:
             return value
         found[key] = match[match.re.groups]

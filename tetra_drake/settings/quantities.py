@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, Wr
 from pydantic_core import CoreSchema, core_schema
 
 from tetra_drake.settings.refusals import described
-from tetra_drake.settings.units import PATTERN, PLUS_MINUS, plainest, quantity_to_si
+from tetra_drake.settings.units import OTHER_SIGNS, PATTERN, PLUS_MINUS, plainest, quantity_to_si
 
 
 class Quantity(float):
@@ -55,7 +55,7 @@ def quantity(unit: str, **words: float) -> tuple[Any, ...]:
 
     schema: dict[str, Any] = {
         "type": ["string", "number"],
-        "pattern": f"^({'|'.join((*words, PATTERN))})({PLUS_MINUS}.+)?$",
+        "pattern": f"^({'|'.join((*words, PATTERN))})({PLUS_MINUS}.+)?$|{OTHER_SIGNS}",
         "patternErrorMessage": expected,
         "if": {"type": "number"},
         "then": {"const": 0, "errorMessage": expected},

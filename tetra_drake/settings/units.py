@@ -9,6 +9,7 @@ import contextlib
 import functools
 import math
 import re
+import unicodedata
 from collections.abc import Iterator
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -143,23 +144,44 @@ PATTERN = rf"\s*({NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*"
 """Regular expression of a quantity: groups of its number, a "1 /" before its unit, and its unit."""
 PLUS_MINUS = r"(?:±|\+/-)"
 """Regular expression of what stands between a quantity and its tolerance."""
+OTHER_SIGNS = r"^\s*[-+−\d.].*[^\x00-\x7F]"
+"""Regular expression of texts that are perhaps quantities by plain()."""
+
+_SIGNS = str.maketrans("·⋅∙×−∕⁄μ", "****-//u") | {ord("°"): "deg", ord("Å"): "angstrom"}
+_AMBIGUOUS = {"gr": "g or grain", "ton": "t (1000 kg) or 2000 lb", "cwt": "100 lb or 112 lb"}
+_AMBIGUOUS |= {"mil": "thou, mm or mrad", "pond": "gf or lbf", "grade?": "deg or gon"}
+_AMBIGUOUS |= {"Ns": "N or N*s", "lbfs": "lbf or lbf*s"}
+"""What names may mean that Pint reads, but not as many people do; without prefix and plural."""
+
+
+def plain(text: str) -> str:
+    """A quantity in ASCII, such as "1.5e3 N*m^-1" for "1.5×10³ N·m⁻¹"."""
+    powers = unicodedata.normalize("NFKC", re.sub("[⁺⁻]?[⁰¹²³⁴-⁹]+", r"^\g<0>", text))
+    return re.sub(r"\s*[×·⋅]\s*10(\^|\*\*)", "e", powers).translate(_SIGNS)
 
 
 @functools.lru_cache(maxsize=1000)  # a base is read again for each file
 def quantity_to_si(text: str, unit: str) -> float:
     """Reads a quantity such as "25 lbf/in", or "1 /in", as a number in the SI unit `unit` ("N/m").
 
-    Raises ValueError if the text is no quantity, has another dimension, or is beyond 1e15.
+    Raises ValueError if the text is no quantity, has another dimension (angle is one), is beyond
+    1e15, or has a name of a unit with two meanings.
     """
     import pint
 
     example = f"expected a quantity that converts to {unit}"
-    match = re.fullmatch(PATTERN, text)
+    match = re.fullmatch(PATTERN, plain(text))
     if match is None:
         raise ValueError(f"found '{text}', which is not a quantity; {example}")
+    for name, meant in _AMBIGUOUS.items():
+        if unclear := re.search(rf"\b[kmMu]?{name}s?\b", match[3]):
+            raise ValueError(f"found '{text}', expected {meant} in place of {unclear[0]}")
     try:
         given = f"1/{match[3]}" if match[2] else match[3]
-        number = float(pint.Quantity(float(match[1]), given).to(unit).magnitude)
+        found = pint.Quantity(float(match[1]), given)
+        if not (found / pint.Quantity(1.0, unit)).unitless:  # angles are units without dimension
+            raise pint.DimensionalityError(found.units, unit)
+        number = float(found.to(unit).magnitude)
     except pint.DimensionalityError as error:
         raise ValueError(f"found '{text}', {example}") from error
     except Exception as error:  # pint raises tokenizer, syntax and type errors of many kinds

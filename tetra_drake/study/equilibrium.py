@@ -135,7 +135,7 @@ class EquilibriumStudy:
 
     @functools.cached_property
     def damped(self) -> DampedModes:
-        """Modes with damping. Nodes on the ground stick; see linearize()."""
+        """Modes with damping. Nodes on the ground stick by their friction; see linearize()."""
         return linearize(self.robot, self.robot.equilibrium.state).modes()
 
 
@@ -243,10 +243,11 @@ def structure_text(study: EquilibriumStudy) -> str:
     units = robot.scenario.units
     length, force = units.length_name, units.force_name
     lowest = ", ".join(f"{frequency:.3g}" for frequency in study.lowest_frequencies())
-    on_ground = ground = ""
+    slides = ground = sticks = ""
     if structure.contacts.size:
         stiffness = units.shown(robot.scenario.ground.stiffness, "N/m")
-        on_ground, ground = " on the ground", f", on a ground of {stiffness} per node"
+        slides, ground = ", feet free to slide", f", on a ground of {stiffness} per node"
+        sticks = f", feet held by {robot.scenario.friction.text}"
     bodies, height = [], functools.partial(fixed, digits=units.decimals + 1)
     for body, mass in zip(structure.bodies, structure.mass, strict=True):
         nodes = study.nodes[study.nodes["body"] == body]
@@ -261,7 +262,7 @@ def structure_text(study: EquilibriumStudy) -> str:
         f"{structure.signals} oscillators, {rounded(1e3 * structure.mass.sum(), 4)} g",
         f"Without weight: self-stress states {len(statics.self_stresses)}, "
         f"infinitesimal mechanisms {statics.mechanisms}.",
-        f"Lowest natural frequencies{on_ground}, undamped: {lowest or 'none'} Hz.",
+        f"Lowest natural frequencies without damping{slides}: {lowest or 'none'} Hz.",
         f"At rest, without actuation{ground}:",
         TextTable(headings, bodies).text(),
     ]
@@ -282,7 +283,6 @@ def structure_text(study: EquilibriumStudy) -> str:
     if len(structure.bodies) < _LARGE:
         lowest_damped = enumerate(zip(*study.damped[:2], strict=True), start=1)
         rows = [[str(i), rounded(hertz), fixed(ratio, 4)] for i, (hertz, ratio) in lowest_damped]
-        sticks = "; nodes on the ground stick" if structure.contacts.size else ""
         lines.append(f"Modes with damping{sticks}:" if rows else "No oscillations with damping.")
         headings = ["mode", "frequency (Hz)", "damping ratio"]
         lines += [TextTable(headings, rows[:_FREQUENCIES]).text()] if rows else []

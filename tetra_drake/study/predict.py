@@ -176,9 +176,10 @@ def predict(
         quantities: names; or measures by names of your choice. A measure is a name, or a function
             to a number from the SimulationResult of a draw if there is a gait or a command, with
             its trajectory; else from its EquilibriumStudy. Names with a gait or a command: metrics,
-            such as "speed". Names at rest: "n3 z", a coordinate; "frequency 1"; and a column of the
-            tables of study_equilibrium() with a node, a cable or a group of cables, which gives the
-            mean: "tension side", "length side n0 n3", "load n0".
+            such as "speed", and names at rest, of the robot without signals. Names at rest: "n3 z",
+            a coordinate; "frequency 1"; and a column of the tables of study_equilibrium() with a
+            node, a cable or a group of cables, which gives the mean: "tension side", "length side
+            n0 n3", "load n0".
         gait: a gait, its file, or a run (its best gait). All draws are simulated side by side.
         command: a command for the actuators in place of a gait.
         draws: number of draws.
@@ -321,24 +322,22 @@ def _values(
                     found[place] = future.result()
                 except (InputError, SimulationFailure) as error:
                     found[place] = error
-    is_named = any(isinstance(each, str) for each in measures.values())
+    names = {each for each in measures.values() if isinstance(each, str)}
+    rests = driver is not None and not METRICS.keys() >= names
     for place, outcome in enumerate(found):
         if isinstance(outcome, Exception):
             continue
         try:
-            known = _numbers_of(outcome) if is_named else {}
+            known = {} if driver is None else {n: getattr(outcome.metrics, n) for n in METRICS}
+            if rests:
+                known |= values_at_rest(study_equilibrium(Robot.of(able[place], at_rest=True)))
+            elif driver is None and names:
+                known = values_at_rest(outcome)
             values = [_value(outcome, known, each) for each in measures.values()]
             found[place] = [value if math.isfinite(value) else math.nan for value in values]
         except (InputError, SimulationFailure) as error:
             found[place] = error
     return found
-
-
-def _numbers_of(outcome: EquilibriumStudy | SimulationResult) -> dict[str, float]:
-    """Numbers of an outcome in SI, by the names of measures."""
-    if isinstance(outcome, SimulationResult):
-        return {name: getattr(outcome.metrics, name) for name in METRICS}
-    return values_at_rest(outcome)
 
 
 def _value(
@@ -349,7 +348,7 @@ def _value(
     if not isinstance(measure, str):
         return float(measure(outcome))
     if measure not in known:
-        if isinstance(outcome, EquilibriumStudy) and re.fullmatch(r"frequency [1-9]\d*", measure):
+        if re.fullmatch(r"frequency [1-9]\d*", measure):
             return math.nan
         what = "needs a gait or a command" if measure in METRICS else "is unknown"
         raise InputError("predict", f"quantities.{measure}", f"{what}; {hint(measure, known)}")
@@ -440,16 +439,16 @@ def save_predictions(predictions: Predictions, folder: Path) -> list[str]:
 def predictions_figure(predictions: Predictions) -> Drawn:
     """Intervals of predicted quantities, and the shares of tolerances.
 
-    Left: the median and the 90 % interval, relative to the nominal value; numbers are in SI. Where
-    an interval is wider than the nominal value is large, its width is the unit. Right: the share of
-    each tolerance in the variance.
+    Left: the median and the 90 % interval, as differences from the nominal value in percent of it;
+    numbers are in SI. An interval ten times as wide as its nominal value is not drawn there. Right:
+    the share of each tolerance in the variance.
     """
     table, shares = predictions.quantities.iloc[::-1], predictions.shares.iloc[::-1]
     names = [f"{name}: {interval_text(row)} {row['unit']}" for name, row in table.iterrows()]
     page = page_of(height_in=0.5 * len(table) + 1.6)
     left, right = page.subplots(1, 2, sharey=True)
-    size = np.maximum(table["nominal"].abs(), table["high"] - table["low"])
-    scale = 100.0 / size.where(size > 0.0, 1.0)
+    size, width = table["nominal"].abs(), table["high"] - table["low"]
+    scale = 100.0 / size.where((size > 0.0) & (width < 10.0 * size))
     low, middle, high = (
         (table[end] - table["nominal"]) * scale for end in ("low", "median", "high")
     )
@@ -458,6 +457,8 @@ def predictions_figure(predictions: Predictions) -> Drawn:
     left.hlines(places, low, high, color=OKABE_ITO["sky_blue"], linewidth=5.0)
     left.plot(middle, places, "o", color=OKABE_ITO["blue"])
     left.set(xlabel="difference from nominal (%)")
+    for place in np.flatnonzero(scale.isna()):
+        left.text(0.0, place, " too wide for percent", va="center", fontsize="small")
     left.margins(x=0.05)
     left.set_yticks(places, [folded(name, _NAMES * page_width()) for name in names])
     for series, (key, column) in enumerate(shares.items()):
