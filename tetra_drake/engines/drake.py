@@ -36,15 +36,10 @@ from tetra_drake.errors import (
 )
 from tetra_drake.kernels.packed import write_tables
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
-from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS, Ground
+from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.equilibrium import (
-    Unactuated,
-    force_at_rest,
-    mass_matrix,
-    stiffness_at_rest,
-)
+from tetra_drake.robot.equilibrium import Unactuated, damping_at_rest, mass_matrix
 from tetra_drake.robot.gait import GivenGait, given_gait, with_body
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
@@ -289,7 +284,8 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     If the scenario sets no target accuracy, it is half the least damping ratio of a cable, but at
     least 2e-5 and at most 5e-3, or 1e-2 where nodes never slip. The damping ratio c / (2 sqrt(k m))
     is for the cable's damping c and stiffness k, and the reduced mass m of the two bodies that it
-    joins. For a structure without elastic cables it is 2e-5.
+    joins. For a structure without elastic cables it is 2e-5. The longest step also follows the
+    damping; see Robot.longest_step.
 
     The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
     monitor replaces it.
@@ -358,7 +354,8 @@ class _Steps:
         """The steps of a robot; see MakeSimulator()."""
         pace = _STICKING if robot.scenario.friction.never_slips else _SLIPPING
         accuracy = min(pace.coarsest, max(_FINEST, 0.5 * _least_damping_ratio(robot)))
-        given = {"max_step": settings.max_step, "look_ahead": settings.look_ahead}
+        longest = settings.max_step or min(pace.max_step, robot.longest_step)
+        given = {"max_step": longest, "look_ahead": settings.look_ahead}
         return cls(
             scheme=settings.scheme or default_scheme(robot),
             accuracy=settings.accuracy or accuracy,
@@ -394,23 +391,9 @@ def default_scheme(robot: Robot) -> str:
 def _damping_rate(robot: Robot) -> float:
     """Greatest rate (1/s) at which dampers of cables, anchors and joints stop a motion, away from
     the ground."""
-    model, lengths = robot.model, robot.structure.initial_lengths
-    cables, anchors, joints, loads = model.cables, model.anchors, model.joints, model.loads
-    # Springs in place of the dampers, so that the stiffness matrix is the damping matrix.
-    law = cables.law._replace(stiffness=cables.law.damping, free_length=lengths)
-    damped = Unactuated(
-        model._replace(
-            cables=cables._replace(law=law),
-            anchors=anchors._replace(stiffness=anchors.damping),
-            joints=joints._replace(stiffness=joints.damping),
-            loads=loads._replace(forces=np.zeros_like(loads.forces)),
-            ground=Ground.nowhere(),
-            strut_contact=model.strut_contact._replace(acts=False),
-            slack=False,
-        )
-    )
-    force_at_rest(damped, robot.structure.initial_state)
-    damping, mass = csc_array(stiffness_at_rest(damped)), csc_array(mass_matrix(damped))
+    unactuated = Unactuated(robot.model)
+    damping = csc_array(damping_at_rest(unactuated, robot.structure.initial_state))
+    mass = csc_array(mass_matrix(unactuated))
     return float(eigsh(damping, 1, mass, which="LA", return_eigenvectors=False)[0])
 
 

@@ -44,7 +44,8 @@ class Drake(EngineSettings):
     bodies, from 2e-5 to 0.005: longer steps of radau3 would damp vibrations more than the cables
     do. Where nodes never slip, as with `friction.reset: range`, it is up to 0.01."""
     max_step: Time | None = Field(default=None, gt=0)
-    """Longest step. If not given, 8 ms; 12 ms where nodes never slip."""
+    """Longest step. If not given, 8 ms, or 12 ms where nodes never slip; shorter for a robot with a
+    lightly damped cable, anchor or joint (a damping ratio below 0.05 with its whole mass)."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
     """When a node may change its mode: at the end of steps, or where a witness function is zero.
     `witness` needs short steps, such as the steps of runge_kutta3."""
@@ -62,7 +63,12 @@ class Compiled(EngineSettings):
     """Permitted error per step of the velocity of a body; for rotations, of its strut tips. If not
     given, 0.1 mm/s; 5 mm/s where nodes never slip, as with `friction.reset: range`."""
     max_step: Time = Field(default=0.003, gt=SHORTEST_STEP, le=1)
-    """Longest step."""
+    """Longest step. The default becomes shorter as for !Drake."""
+
+    def longest_step(self, light: float) -> float:
+        """The longest step (s), where `light` (s) is the longest for light vibrations."""
+        is_default = self.max_step == type(self).model_fields["max_step"].default
+        return min(self.max_step, light) if is_default else self.max_step
 
     def tolerance_under(self, friction: FrictionKind) -> float:
         """The tolerance in m/s; if not given, the default for this friction."""
