@@ -355,17 +355,17 @@ class Factor(NamedTuple):
         return x.ravel()
 
 
-def free_motions(robot: Unactuated, state: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+def free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     """Orthonormal basis (6*n, motions), in columns, of the displacements that no force resists:
     motions of the whole robot, and what else has no stiffness but rounding errors, such as the spin
-    of a bar about its axis. For the components see displaced().
-
-    `stiffness` (6*n, 6*n) is the full matrix of stiffness_at_rest() in this state (13*n,).
-    """
+    of a bar about its axis. For the components see displaced(). The state (13*n,) is the one of the
+    last call of force_at_rest()."""
+    stiffness = stiffness_at_rest(robot).toarray()
     farthest = np.abs(robot.forces.nodes[:, P_WN : P_WN + 3]).max()
-    share = max(LEAST_STIFFNESS, ROUNDING * farthest / robot.radius)
+    share = max(
+        LEAST_STIFFNESS, ROUNDING * farthest / (robot.model.bodies.radius.max() or farthest)
+    )
     soft = soft_space(stiffness, share * stiffness.diagonal().max())
-    # Both are bases of spaces that contain or avoid each other's vectors.
     return linalg.orth(np.hstack([_rigid_motions(robot, state).T, soft]), rcond=0.1)
 
 

@@ -169,30 +169,30 @@ class Robot:
         return equilibrium_of(self.scenario, _placed(self.scenario))
 
     @functools.cached_property
-    def longest_step(self) -> float:
-        """Longest step (s) that keeps light damping; infinite without it.
-
-        No tolerance sees vibrations that are smaller, and long steps damp them: a step h adds the
-        ratio (w h)³ / 72 to the damping of a mode w with radau3, / 112 with ROS2, / 24 with
-        runge_kutta3. So (w h)³ is the least ratio c / (2 sqrt(k m)) of a spring, m the mass of the
-        robot, and w the fastest mode with light damping. Modes that stretch no spring, which every
-        tensegrity has, do not shorten steps if all springs are well damped.
-        """
+    def damping_ratio(self) -> float:
+        """Least damping ratio c / (2 sqrt(k m)) of a cable, anchor or joint with the stiffness k
+        and the damping c, for the mass m of the robot; 0 without them."""
         springs = self.model.cables.law, self.model.anchors, self.model.joints
-        k, c = (
-            np.concatenate([getattr(spring, name).ravel() for spring in springs])
-            for name in ("stiffness", "damping")
-        )
-        ratios = 0.5 * c[k > 0.0] / np.sqrt(k[k > 0.0] * self.structure.mass.sum())
-        ratio = ratios.min(initial=np.inf)
-        if ratio >= LIGHT:
+        k = np.concatenate([spring.stiffness.ravel() for spring in springs])
+        c = np.concatenate([spring.damping.ravel() for spring in springs])[k > 0.0]
+        return float(min(0.5 * c / np.sqrt(k[k > 0.0] * self.structure.mass.sum()), default=0.0))
+
+    @functools.cached_property
+    def longest_step(self) -> float:
+        """Longest step (s) that keeps light damping; infinite if `damping_ratio` is not light.
+
+        Tolerances do not see the smallest vibrations, and long steps damp them: a step h adds the
+        ratio (w h)³ / 72 to a mode of the frequency w (rad/s) with radau3, / 112 with ROS2, / 24
+        with runge_kutta3. So (w h)³ is `damping_ratio` for the fastest lightly damped mode.
+        """
+        if self.damping_ratio >= LIGHT:
             return np.inf
         aloft = Unactuated(self.model._replace(ground=Ground.nowhere()))
         damping = damping_at_rest(aloft, self.structure.initial_state)
         squares, modes = linalg.eigh(stiffness_at_rest(aloft).toarray(), mass_matrix(aloft))
         rates = np.sqrt(np.maximum(squares, 0.0))
         is_light = (modes * (damping @ modes)).sum(axis=0) < 2.0 * LIGHT * rates
-        return float(np.cbrt(max(ratio, LEAST)) / rates[is_light].max(initial=1e-9))
+        return float(np.cbrt(max(self.damping_ratio, LEAST)) / rates[is_light].max(initial=1e-9))
 
     @functools.cached_property
     def senses(self) -> Senses:

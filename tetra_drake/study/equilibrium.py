@@ -181,7 +181,7 @@ def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.nda
     state = robot.equilibrium.state
     force_at_rest(unactuated, state)
     rigid = stiffness_at_rest(unactuated).toarray()
-    free, mass = free_motions(unactuated, state, rigid), mass_matrix(unactuated)
+    free, mass = free_motions(unactuated, state), mass_matrix(unactuated)
     stiffness, momenta = condensed(rigid, robot.structure, unactuated, state), mass @ free
     above = 2.0 * np.trace(np.linalg.solve(mass, stiffness))  # twice the sum of all squares
     lift = above * momenta @ np.linalg.solve(free.T @ momenta, momenta.T)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,14 +21,7 @@ from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.laws.rates import rates_and_forces
-from tetra_drake.robot.equilibrium import (
-    Unactuated,
-    displace,
-    force_at_rest,
-    free_motions,
-    mass_matrix,
-    stiffness_at_rest,
-)
+from tetra_drake.robot.equilibrium import Unactuated, displace, force_at_rest, free_motions
 from tetra_drake.robot.readings import Readings, bodies_state
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
@@ -41,9 +33,8 @@ STEP = 1e-6
 the greatest force (N), and of the greatest state of an actuator. The matrices are exact to some
 1e-10 of their greatest numbers; the spin of a thin bar, whose inertia is small, to 1e-8."""
 _ROUNDED, _UNRESISTED, _SOLVED = 1e-9, 1e-7, 1e-3
-"""Greatest errors: of an eigenvalue, as a share of the greatest one; of a stiffness or damping in
-the matrices, as a share of the greatest stiffness (in SI units); of LQR's equation, as a share of
-its greatest term."""
+"""Greatest errors: of an eigenvalue, as a share of the greatest one; of numbers of the matrices, as
+a share of the greatest; of LQR's equation, as a share of its greatest term."""
 BALANCED = 1e-4
 """Force left at rest, at most, as a share of the greatest force."""
 
@@ -93,18 +84,18 @@ class Linearization:
     """State [q; v] (13*bodies,) about which the motions are small."""
     signals: np.ndarray
     """Signals (inputs,) in N in this state."""
-    free: np.ndarray
-    """States (states, k), in columns, that no force resists: displacements, such as the spin of a
-    bar about its axis, then the velocities of those that no damping resists either."""
+    resisted: np.ndarray
+    """Orthonormal basis (states, k), in columns, of the states without motions that no force
+    resists, such as the spin of a bar about its axis."""
 
     def modes(self) -> DampedModes:
         """The oscillations of the system: damped frequencies, damping ratios, and shapes."""
-        A, kept, bodies = self.system.A(), self._kept, len(self.robot.structure.bodies)
+        A, kept, bodies = self.system.A(), self.resisted, len(self.robot.structure.bodies)
         roots, vectors = linalg.eig(kept.T @ A @ kept)
         swings = np.flatnonzero(roots.imag > _ROUNDED * np.abs(roots).max(initial=0.0))
         swings = swings[roots.imag[swings].argsort(kind="stable")]
         roots = roots[swings]
-        # A maps what the motions have of `free` to 0 when it is applied twice.
+        # Twice A, because it then maps the parts that are left out to 0.
         whole = A @ (A @ (kept @ vectors[:, swings])) / roots**2
         motions = whole[: 6 * bodies].T.reshape(-1, bodies, 6)
         shapes = node_motions(self.robot.structure, self.state, motions)
@@ -121,8 +112,8 @@ class Linearization:
         """Gain K (inputs, states) of the linear-quadratic regulator (LQR): u = -K x has the least
         integral of xᵀ Q x + uᵀ R u.
 
-        The states `free` are left out, because no signal can hold them: a bar spins about its axis,
-        a floating robot drifts.
+        What no force resists is left out, because no signal can hold it: a bar spins about its
+        axis, a floating robot drifts.
 
         Args:
             state_cost: the matrix Q (states, states), symmetric without negative eigenvalues.
@@ -136,7 +127,7 @@ class Linearization:
         A, B = self.system.A(), self.system.B()
         Q = _checked_cost(state_cost, len(A), "state_cost")
         R = _checked_cost(input_cost, B.shape[1], "input_cost")
-        kept = self._kept  # keptᵀ x are states of their own, without the states left out
+        kept = self.resisted  # keptᵀ x are states of their own, without the states left out
         A, B, Q = kept.T @ A @ kept, kept.T @ B, kept.T @ Q @ kept
         try:
             to_go = linalg.solve_continuous_are(A, B, Q, R)
@@ -148,11 +139,6 @@ class Linearization:
         if not (is_solved and (linalg.eigvals(A - B @ gain).real < 0.0).all()):
             raise InputError("lqr", "", "finds no gain that brings all motions to rest")
         return np.asarray(gain @ kept.T)
-
-    @functools.cached_property
-    def _kept(self) -> np.ndarray:
-        """Orthonormal basis (states, kept), in columns, of the states orthogonal to `free`."""
-        return np.asarray(linalg.null_space(self.free.T))
 
     def controller(self, gain: npt.ArrayLike) -> Controller:
         """State feedback u = -K x: a function from the time (s) and the readings of a robot to its
@@ -241,8 +227,7 @@ def linearize(
     A, *matrices = _matrices(robot, at, fixed, outputs, of_signals=greatest)
     if not all(np.isfinite(matrix).all() for matrix in (A, *matrices)):
         raise InputError("linearize", "state", "found a state whose forces are not finite")
-    free, count = _free_states(robot, at, A), 6 * len(structure.bodies)
-    A[count:] -= A[count:] @ free @ np.linalg.pinv(free)  # rounding errors
+    resisted = _resisted_states(robot, at, A)
     return Linearization(
         robot=robot,
         system=LinearSystem(A, *matrices),
@@ -251,7 +236,7 @@ def linearize(
         outputs=tuple(name for output in outputs for name in names[output]),
         state=at,
         signals=robot.first_signals,
-        free=free,
+        resisted=resisted,
     )
 
 
@@ -335,25 +320,21 @@ def _matrices(
     return of_states[:size], of_inputs[:size], of_states[size:], of_inputs[size:]
 
 
-def _free_states(robot: Robot, state: np.ndarray, A: np.ndarray) -> np.ndarray:
-    """`free` of a Linearization with the matrix A: the structure's free motions, as far as nothing
-    in A resists them, such as friction."""
+def _resisted_states(robot: Robot, state: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """`resisted` of a Linearization with the matrix A: all but the structure's free motions, as far
+    as nothing in A resists them, such as friction. Their forces in A, rounding errors, become 0."""
     unactuated = Unactuated(robot.model)
     force_at_rest(unactuated, state)
-    stiffness, mass = stiffness_at_rest(unactuated).toarray(), mass_matrix(unactuated)
-    n, rounding = len(mass), _UNRESISTED * stiffness.diagonal().max()
-    scale = np.tile(np.repeat([unactuated.radius, 1.0], 3), n // 6)[:, np.newaxis]
-
-    def unresisted(motions: np.ndarray, columns: slice) -> np.ndarray:
-        forces = mass @ (scale * (A[n : 2 * n, columns] @ motions))
-        _, sizes, ways = np.linalg.svd(forces, full_matrices=False)
-        return motions @ ways[sizes <= rounding].T
-
-    free = free_motions(unactuated, state, stiffness) / scale
-    free = free @ linalg.null_space(A[:n, :n] @ free)  # a spinning body carries its turns along
-    moves = unresisted(free, slice(n))
-    drifts = unresisted(moves, slice(n, 2 * n))
-    return np.pad(linalg.block_diag(moves, drifts), ((0, len(A) - 2 * n), (0, 0)))
+    free, spaces = free_motions(unactuated, state), []
+    n, radii = len(free), np.repeat([unactuated.radius, 1.0], 3)
+    free /= np.tile(radii, n // 6)[:, np.newaxis]
+    for first in (0, n):  # displacements, then velocities
+        _, rates, ways = np.linalg.svd(A[n : 2 * n, first : first + n] @ free, full_matrices=False)
+        free = free @ ways[rates <= _UNRESISTED * np.abs(A[n : 2 * n, :n]).max()].T
+        spaces.append(free)
+    free = np.pad(linalg.block_diag(*spaces), ((0, len(A) - 2 * n), (0, 0)))
+    A[n:] -= A[n:] @ free @ np.linalg.pinv(free)
+    return np.asarray(linalg.null_space(free.T))
 
 
 def _forces_left(robot: Robot, state: np.ndarray, modes: np.ndarray) -> tuple[float, float]:
