@@ -346,3 +346,36 @@ def test_the_diagram_hardly_damps_what_has_no_dampers():
     still[7 * len(robot.structure.bodies) :] = 0.0
     energy, kept, least = (energy_and_momenta(robot, state)[0] for state in (start, end, still))
     assert kept == pytest.approx(energy, abs=2e-4 * (energy - least))
+
+
+@pytest.mark.parametrize("engine", ["!Compiled {}", "!Drake {}"])
+@pytest.mark.parametrize(
+    ("frequency", "ratio", "size"), [(46.0, 1.4e-3, 1e-5), (5.0, 5e-4, 1e-6), (300.0, 0.02, 1e-7)]
+)
+def test_the_smallest_vibrations_keep_their_damping(frequency, ratio, size, engine):
+    # A ball between six springs of 0.5 m, whose tension holds it sideways as well.
+    mass, tension, rate = 0.05, 0.2, 2.0 * np.pi * frequency
+    stiffness = 0.5 * (mass * rate**2 - 8.0 * tension)
+    ends = {f"e{i}": [*place] for i, place in enumerate(0.5 * np.vstack([np.eye(3), -np.eye(3)]))}
+    springs = {"stiffness": stiffness, "damping": ratio * mass * rate, "tension": tension}
+    tree = {
+        "nodes": {"ball": [0.0, 0.0, 0.0]} | ends,
+        "masses": {"ball": mass},
+        "cables": {"springs": springs | {"pairs": [["ball", end] for end in ends]}},
+        "anchors": dict.fromkeys(ends, "xyz"),
+        "offsets": [[size, 0.0, 0.0]],
+        "gravity": 0.0,
+    }
+    scenario = scenario_of(tree, 10.0 / frequency, engine=engine)
+    robot = Robot.of(scenario)
+    end = simulate(scenario, seeded_gait(scenario), record=True).trajectory.isel(time=-1)
+    x, v = float(end.p_WN.sel(node="ball", axis="x")), float(end.v_WN.sel(node="ball", axis="x"))
+    # Of one spring: two act at once.
+    assert robot.longest_step == pytest.approx(np.cbrt(ratio / np.sqrt(2.0)) / rate, rel=0.05)
+    left = np.log(np.hypot(x, v / rate) / size) / (-rate * float(end.time))
+    assert left == pytest.approx(ratio, rel=0.05)
+
+
+def test_robots_with_well_damped_cables_take_steps_of_any_length():
+    for name in ("thesis", "prism", "six_bar", "mast", "winch", "rolling"):
+        assert Robot.of(load_scenario(name)).longest_step == np.inf

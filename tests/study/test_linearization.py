@@ -272,6 +272,41 @@ def test_a_regulator_damps_a_floating_robot_and_lets_it_drift():
     assert gain @ np.concatenate([drift, 0.0 * drift]) == pytest.approx(np.zeros(6), abs=1e-4)
 
 
+def test_a_regulator_damps_the_slow_swing_of_a_load_on_a_long_rope():
+    # m x'' = -s x + f with the costs 1 of x and its rate, and r of f. Riccati's equation gives the
+    # gains k = sqrt(s² + 1 / r) - s and c = sqrt(2 m k + 1 / r).
+    long, mass, cost = 150.0, 500.0, 1e-4
+    rope = {"stiffness": 1e5, "damping": 100.0, "tension": mass * 9.80665}
+    guy = {"stiffness": 1.0, "damping": 0.0, "tension": 1.0}
+    tree = {
+        "nodes": {"hook": [0, 0, long], "load": [0, 0, 0], "x": [60, 0, 0], "y": [0, 60, 0]},
+        "masses": {"load": mass},
+        "cables": {
+            "rope": rope | {"pairs": [["hook", "load"]]},
+            "guy": guy | {"pairs": [["load", "x"], ["load", "y"]]},
+        },
+        "anchors": dict.fromkeys(["hook", "x", "y"], "xyz"),
+        "actuated": {"x": ["guy load x"], "y": ["guy load y"]},
+    }
+    linear = linearize(scenario_of(tree))
+    gain = linear.lqr(np.eye(12), cost * np.eye(2))
+    spring = mass * -linear.system.A()[9, 3]  # with the guys, which are soft
+    assert spring == pytest.approx(mass * 9.80665 / long + 1.0, rel=0.01)
+    k = math.sqrt(spring**2 + 1.0 / cost) - spring
+    c = math.sqrt(2.0 * mass * k + 1.0 / cost)
+    assert gain[0, [3, 9]] == pytest.approx([k, c], rel=0.01)
+    swing = math.sqrt(spring / mass) / math.tau
+    assert linear.modes().frequencies[:2] == pytest.approx([swing, swing], rel=0.01)
+
+
+def test_gains_grow_as_the_root_of_a_high_cost():
+    gains = [prism().lqr(cost * np.eye(36), np.eye(6)) for cost in (1e8, 1e10)]
+    assert gains[1] == pytest.approx(10.0 * gains[0], abs=0.02 * np.abs(gains[1]).max())
+    A, B, kept = prism().system.A(), prism().system.B(), prism().resisted
+    assert kept.shape == (36, 30), "three spins of bars are left out"
+    assert np.linalg.eigvals(kept.T @ (A - B @ gains[1]) @ kept).real.max() < -0.9
+
+
 def test_bristles_hold_the_nodes_that_stick_and_none_in_the_air():
     # Three nodes bear the prism, each with a bristle of 300 N/m. All bodies move along x.
     for modes, stiffness in ((None, 900.0), (np.zeros((6, MODE_COLUMNS)), 0.0)):

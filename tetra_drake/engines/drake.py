@@ -36,15 +36,10 @@ from tetra_drake.errors import (
 )
 from tetra_drake.kernels.packed import write_tables
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
-from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS, Ground
+from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.equilibrium import (
-    Unactuated,
-    force_at_rest,
-    mass_matrix,
-    stiffness_at_rest,
-)
+from tetra_drake.robot.equilibrium import Unactuated, damping_at_rest, mass_matrix
 from tetra_drake.robot.gait import GivenGait, given_gait, with_body
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
@@ -287,10 +282,9 @@ class _DiagramRobot(LoneRobot):
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     """Drake's Simulator for a robot's diagram, with the integrator settings of the scenario.
 
-    If the scenario sets no target accuracy, it is half the least damping ratio of a cable, but at
-    least 2e-5 and at most 5e-3, or 1e-2 where friction is nearly viscous. The damping ratio
-    c / (2 sqrt(k m)) is for the cable's damping c and stiffness k, and the reduced mass m of the
-    two bodies that it joins. For a structure without elastic cables it is 2e-5.
+    If the scenario sets no target accuracy, it is half of Robot.damping_ratio, but at least 2e-5
+    and at most 5e-3, or 1e-2 where friction is nearly viscous. If it sets no longest step,
+    Robot.longest_step limits it.
 
     The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
     monitor replaces it.
@@ -358,25 +352,15 @@ class _Steps:
     def of(cls, robot: Robot, settings: Drake) -> _Steps:
         """The steps of a robot; see MakeSimulator()."""
         pace = _VISCOUS if robot.scenario.friction.is_viscous else _SLIPPING
-        accuracy = min(pace.coarsest, max(_FINEST, 0.5 * _least_damping_ratio(robot)))
-        given = {"max_step": settings.max_step, "look_ahead": settings.look_ahead}
+        accuracy = min(pace.coarsest, max(_FINEST, 0.5 * robot.damping_ratio))
+        longest = settings.max_step or min(pace.max_step, robot.longest_step)
+        given = {"max_step": longest, "look_ahead": settings.look_ahead}
         return cls(
             scheme=settings.scheme or default_scheme(robot),
             accuracy=settings.accuracy or accuracy,
             at_step_end=settings.mode_changes == "step_end",
             pace=pace._replace(**{key: x for key, x in given.items() if x is not None}),
         )
-
-
-def _least_damping_ratio(robot: Robot) -> float:
-    """Least damping ratio of an elastic cable between its bodies; 0 if there is none."""
-    structure = robot.structure
-    is_elastic = structure.cables["stiffness"] > 0.0
-    cables, carriers = structure.cables[is_elastic], structure.carriers[structure.segments.ends]
-    per_mass = np.append(1.0 / structure.mass, 0.0)  # of the bodies, then of the world
-    per_reduced_mass = structure.along_cables(per_mass[carriers].sum(axis=1))[is_elastic]
-    ratios = 0.5 * cables["damping"] * np.sqrt(per_reduced_mass / cables["stiffness"])
-    return float(min(ratios, default=0.0))
 
 
 def default_scheme(robot: Robot) -> str:
@@ -388,31 +372,13 @@ def default_scheme(robot: Robot) -> str:
     robots of more than _FEW bodies whose rate is below _RATE_PER_SQUARE n².
     """
     bodies = len(robot.structure.bodies)
-    explicit = bodies > _FEW and _damping_rate(robot) < _RATE_PER_SQUARE * bodies**2
-    return "runge_kutta3" if explicit else "radau3"
-
-
-def _damping_rate(robot: Robot) -> float:
-    """Greatest rate (1/s) at which dampers of cables, anchors and joints stop a motion, away from
-    the ground."""
-    model, lengths = robot.model, robot.structure.initial_lengths
-    cables, anchors, joints, loads = model.cables, model.anchors, model.joints, model.loads
-    # Springs in place of the dampers, so that the stiffness matrix is the damping matrix.
-    law = cables.law._replace(stiffness=cables.law.damping, free_length=lengths)
-    damped = Unactuated(
-        model._replace(
-            cables=cables._replace(law=law),
-            anchors=anchors._replace(stiffness=anchors.damping),
-            joints=joints._replace(stiffness=joints.damping),
-            loads=loads._replace(forces=np.zeros_like(loads.forces)),
-            ground=Ground.nowhere(),
-            strut_contact=model.strut_contact._replace(acts=False),
-            slack=False,
-        )
-    )
-    force_at_rest(damped, robot.structure.initial_state)
-    damping, mass = csc_array(stiffness_at_rest(damped)), csc_array(mass_matrix(damped))
-    return float(eigsh(damping, 1, mass, which="LA", return_eigenvectors=False)[0])
+    if bodies <= _FEW:
+        return "radau3"
+    unactuated = Unactuated(robot.model)
+    damping = damping_at_rest(unactuated, robot.structure.initial_state)
+    matrices = csc_array(damping), csc_array(mass_matrix(unactuated))
+    rate = eigsh(matrices[0], 1, matrices[1], which="LA", return_eigenvectors=False)[0]
+    return "runge_kutta3" if rate < _RATE_PER_SQUARE * bodies**2 else "radau3"
 
 
 class _Work:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
+from scipy import linalg
 from scipy.sparse import bsr_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -19,11 +20,12 @@ from tetra_drake.kernels.lanes import Table
 from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws import cable
 from tetra_drake.laws.capsules import BARREL, PARALLEL
-from tetra_drake.laws.contact import MODE_COLUMNS, NORMAL, update_modes
+from tetra_drake.laws.contact import MODE_COLUMNS, NORMAL, Ground, update_modes
 from tetra_drake.laws.forces import Forces, Parts, compute_forces, move_robot
 from tetra_drake.laws.kinematics import FORCE, P_WN, move_bodies, rigid_motions
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.stiffness import stiffness_matrix
+from tetra_drake.robot.statics import soft_space
 
 ROUNDING = 64 * np.finfo(float).eps
 """Tolerance for the force left in equilibrium, as a share of the robot's greatest stiffness times
@@ -176,7 +178,7 @@ class _Descent:
             return
         self._stiffness = stiffness_at_rest(self._robot)
         self.work = Envelope.of(self._stiffness).work
-        self._held = _free_motions(self._robot, state)
+        self._held = _rigid_motions(self._robot, state)
         cables = self._robot.model.cables.law.stiffness  # of slack ones, too
         hardest = max(self._stiffness.diagonal().max(), cables.max(initial=0.0))
         farthest = np.abs(self._robot.forces.nodes[:, P_WN : P_WN + 3]).max()
@@ -353,7 +355,21 @@ class Factor(NamedTuple):
         return x.ravel()
 
 
-def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
+def free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (6*n, motions), in columns, of the displacements that no force resists:
+    motions of the whole robot, and what else has no stiffness but rounding errors, such as the spin
+    of a bar about its axis. For the components see displaced(). The state (13*n,) is the one of the
+    last call of force_at_rest()."""
+    stiffness = stiffness_at_rest(robot).toarray()
+    farthest = np.abs(robot.forces.nodes[:, P_WN : P_WN + 3]).max()
+    share = max(
+        LEAST_STIFFNESS, ROUNDING * farthest / (robot.model.bodies.radius.max() or farthest)
+    )
+    soft = soft_space(stiffness, share * stiffness.diagonal().max())
+    return linalg.orth(np.hstack([_rigid_motions(robot, state).T, soft]), rcond=0.1)
+
+
+def _rigid_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     """Orthonormal basis (motions, 6*n) of rigid displacements of the whole robot that change no
     energy: along x, along y and about z; for a robot without weight and contacts all six. Motions
     that anchors, cables from fixed nodes, or loads resist are left out. For the components see
@@ -507,6 +523,28 @@ def stiffness_at_rest(robot: Unactuated) -> bsr_array:
     per_radius = np.repeat([1.0 / robot.radius, 1.0], 3)
     matrix.data = per_radius[:, np.newaxis] * matrix.data * per_radius
     return matrix
+
+
+def damping_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
+    """Damping matrix (6*n, 6*n) in N s/m of cables, anchors and joints in a state (13*n,) at rest,
+    for displacements as in displaced()."""
+    force_at_rest(robot, state)
+    lengths, model = robot.forces.cable_forces[:, cable.LENGTH].copy(), robot.model
+    # Springs in place of the dampers, so that the stiffness matrix is the damping matrix.
+    law = model.cables.law._replace(stiffness=model.cables.law.damping, free_length=lengths)
+    damped = Unactuated(
+        model._replace(
+            cables=model.cables._replace(law=law),
+            anchors=model.anchors._replace(stiffness=model.anchors.damping),
+            joints=model.joints._replace(stiffness=model.joints.damping),
+            loads=model.loads._replace(forces=np.zeros_like(model.loads.forces)),
+            ground=Ground.nowhere(),
+            strut_contact=model.strut_contact._replace(acts=False),
+            slack=False,
+        )
+    )
+    force_at_rest(damped, state)
+    return np.asarray(stiffness_at_rest(damped).toarray())
 
 
 def mass_matrix(robot: Unactuated) -> np.ndarray:

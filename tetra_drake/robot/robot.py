@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from scipy import linalg
 
 from tetra_drake.errors import InputError
 from tetra_drake.kernels.packed import Packed
@@ -22,7 +23,14 @@ from tetra_drake.laws.model import Bodies, Model
 from tetra_drake.laws.oscillator import Network, steered_input
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.bodies import body_inertias
-from tetra_drake.robot.equilibrium import Equilibrium, Unactuated, find_equilibrium
+from tetra_drake.robot.equilibrium import (
+    Equilibrium,
+    Unactuated,
+    damping_at_rest,
+    find_equilibrium,
+    mass_matrix,
+    stiffness_at_rest,
+)
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import lift, make_ground
 from tetra_drake.robot.network import SteeringSignal, Weights, checked_turn
@@ -41,6 +49,8 @@ MOST_CORRECTIONS = 100
 """Largest number of corrections of the lengths of elastic struts, in the search for equilibrium."""
 SAME_LENGTH = 1e-10
 """Change (m) of an elastic strut's length below which no further correction is made."""
+LIGHT, LEAST = 0.05, 1e-4
+"""Damping ratios: below the first one damping is light; steps preserve the second one at least."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +167,32 @@ class Robot:
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
         return equilibrium_of(self.scenario, _placed(self.scenario))
+
+    @functools.cached_property
+    def damping_ratio(self) -> float:
+        """Least damping ratio c / (2 sqrt(k m)) of a cable, anchor or joint with the stiffness k
+        and the damping c, for the mass m of the robot; 0 without them."""
+        springs = self.model.cables.law, self.model.anchors, self.model.joints
+        k = np.concatenate([spring.stiffness.ravel() for spring in springs])
+        c = np.concatenate([spring.damping.ravel() for spring in springs])[k > 0.0]
+        return float(min(0.5 * c / np.sqrt(k[k > 0.0] * self.structure.mass.sum()), default=0.0))
+
+    @functools.cached_property
+    def longest_step(self) -> float:
+        """Longest step (s) that keeps light damping; infinite if `damping_ratio` is not light.
+
+        Tolerances do not see the smallest vibrations, and long steps damp them: a step h adds the
+        ratio (w h)³ / 72 to a mode of the frequency w (rad/s) with radau3, / 112 with ROS2, / 24
+        with runge_kutta3. So (w h)³ is `damping_ratio` for the fastest lightly damped mode.
+        """
+        if self.damping_ratio >= LIGHT:
+            return np.inf
+        aloft = Unactuated(self.model._replace(ground=Ground.nowhere()))
+        damping = damping_at_rest(aloft, self.structure.initial_state)
+        squares, modes = linalg.eigh(stiffness_at_rest(aloft).toarray(), mass_matrix(aloft))
+        rates = np.sqrt(np.maximum(squares, 0.0))
+        is_light = (modes * (damping @ modes)).sum(axis=0) < 2.0 * LIGHT * rates
+        return float(np.cbrt(max(self.damping_ratio, LEAST)) / rates[is_light].max(initial=1e-9))
 
     @functools.cached_property
     def senses(self) -> Senses:

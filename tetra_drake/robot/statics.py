@@ -93,8 +93,8 @@ def find_statics(
 
 
 def soft_space(matrix: np.ndarray, least: float) -> np.ndarray:
-    """Orthonormal basis (n, vectors), in columns, of a symmetric matrix (n, n) without negative
-    eigenvalues: of the eigenvectors whose eigenvalues are at most `least`.
+    """Orthonormal basis (n, vectors), in columns, of a symmetric matrix (n, n): of the eigenvectors
+    whose eigenvalues are at most `least` in size.
 
     A Cholesky factorisation with pivoting finds a space that contains them nearly. It takes a
     thirtieth of the time of an eigenvalue decomposition.
@@ -107,7 +107,7 @@ def soft_space(matrix: np.ndarray, least: float) -> np.ndarray:
     space[soft] = np.eye(size - rank)
     space = linalg.qr(space, mode="economic")[0]
     eigenvalues, vectors = linalg.eigh(space.T @ matrix @ space)
-    return np.asarray(space @ vectors[:, eigenvalues <= least])
+    return np.asarray(space @ vectors[:, np.abs(eigenvalues) <= least])
 
 
 def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:

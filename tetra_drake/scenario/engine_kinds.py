@@ -8,8 +8,8 @@ from tetra_drake.laws.friction import FrictionKind
 from tetra_drake.settings.quantities import Speed, Time
 from tetra_drake.settings.section import Kinds, Section
 
-SHORTEST_STEP = 1e-9
-"""Lower limit (s) of the steps of !Compiled."""
+SHORTEST_STEP, _LONGEST_STEP = 1e-9, 3e-3
+"""Limits (s) of the steps of !Compiled; the upper one is a default."""
 LONGEST_LOOK_AHEAD = 2e-5
 """Upper limit (s) of look_ahead(); a longer one costs evaluations."""
 
@@ -40,11 +40,12 @@ class Drake(EngineSettings):
     above 14 n² per second: the work of radau3 grows with n², the work of runge_kutta3 with the
     rate."""
     accuracy: float | None = Field(default=None, gt=0)
-    """Target accuracy per step. If not given, half the least damping ratio of a cable between its
-    bodies, from 2e-5 to 0.005: longer steps of radau3 would damp vibrations more than the cables
-    do. Where friction is nearly viscous, as in the scenario thesis, it is up to 0.01."""
+    """Target accuracy per step. If not given, half the least damping ratio of a cable, anchor or
+    joint with the robot's mass, from 2e-5 to 0.005: longer steps of radau3 would damp vibrations
+    more. Where friction is nearly viscous, as in the scenario thesis, it is up to 0.01."""
     max_step: Time | None = Field(default=None, gt=0)
-    """Longest step. If not given, 8 ms; 12 ms where friction is nearly viscous."""
+    """Longest step. If not given, 8 ms, or 12 ms where friction is nearly viscous; less if that
+    damping ratio is below 0.05, so that vibrations of any size keep theirs."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
     """When a node may change its mode: at the end of steps, or where a witness function is zero.
     `witness` needs short steps, such as the steps of runge_kutta3."""
@@ -61,8 +62,12 @@ class Compiled(EngineSettings):
     tolerance: Speed | None = Field(default=None, gt=0)
     """Permitted error per step of the velocity of a body; for rotations, of its strut tips. If not
     given, 0.1 mm/s; 5 mm/s where friction is nearly viscous, as in the scenario thesis."""
-    max_step: Time = Field(default=0.003, gt=SHORTEST_STEP, le=1)
-    """Longest step."""
+    max_step: Time = Field(default=_LONGEST_STEP, gt=SHORTEST_STEP, le=1)
+    """Longest step. The default becomes shorter where damping is light, as for !Drake."""
+
+    def longest_step(self, light: float) -> float:
+        """The longest step (s): `max_step`, or `light` if that is less than the default."""
+        return self.max_step if self.max_step != _LONGEST_STEP else min(_LONGEST_STEP, light)
 
     def tolerance_under(self, friction: FrictionKind) -> float:
         """The tolerance in m/s; if not given, the default for this friction."""

@@ -14,8 +14,6 @@ from pathlib import Path
 import numpy as np
 import pandas
 from scipy import linalg
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import eigsh
 from scipy.spatial.transform import Rotation
 
 from tetra_drake.errors import InputError
@@ -27,7 +25,13 @@ from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.laws.kinematics import FORCE
 from tetra_drake.laws.terrain import Flat, Nothing
 from tetra_drake.results.trajectory import Motion, make_dataset
-from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
+from tetra_drake.robot.equilibrium import (
+    Unactuated,
+    force_at_rest,
+    free_motions,
+    mass_matrix,
+    stiffness_at_rest,
+)
 from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.remarks import BEARS, sinking_remark
 from tetra_drake.robot.robot import Robot, equilibrium_of
@@ -39,15 +43,8 @@ from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenar
 from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
 from tetra_drake.scenario.structure_files import names_scenario, read_structure
 from tetra_drake.settings.refusals import no_such
-from tetra_drake.study.linearization import (
-    LEAST_FREQUENCY,
-    DampedModes,
-    linearize,
-    node_motions,
-)
+from tetra_drake.study.linearization import DampedModes, linearize, node_motions
 from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
-
-_LEAST_SQUARE = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
 
 _LARGE = 50
 """Number of bodies from which the lowest frequencies are computed without the others."""
@@ -97,21 +94,13 @@ class EquilibriumStudy:
     def frequencies(self) -> np.ndarray:
         """Natural frequencies without damping, in Hz, ascending. Nodes on the ground slide freely.
         For hundreds of bodies, lowest_frequencies() is faster."""
-        squares = linalg.eigvalsh(*_vibration(self.robot, Unactuated(self.robot.model)))
-        return np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi)
+        return _frequencies(self.robot)
 
     def lowest_frequencies(self, count: int = _FREQUENCIES) -> np.ndarray:
-        """The lowest of `frequencies`, at most `count` (frequencies,), in Hz. For a large robot
-        they are found by Lanczos iterations, to six digits."""
+        """The lowest of `frequencies`, at most `count` (frequencies,), in Hz."""
         if len(self.robot.structure.bodies) < _LARGE:
             return self.frequencies[:count]
-        matrices = _vibration(self.robot, Unactuated(self.robot.model))
-        stiffness, mass = map(csc_array, matrices)
-        # The largest 1 / (square - _LEAST_SQUARE) are the lowest squares above this one.
-        squares, _ = eigsh(
-            stiffness, count, mass, sigma=_LEAST_SQUARE, which="LA", v0=np.ones(mass.shape[0])
-        )
-        return np.sqrt(np.sort(squares[squares > _LEAST_SQUARE])) / (2.0 * math.pi)
+        return _frequencies(self.robot, among=[0, count - 1])
 
     @functools.cached_property
     def modes(self) -> np.ndarray:
@@ -124,8 +113,8 @@ class EquilibriumStudy:
         """Mode shapes, and the motions of the bodies (frequencies, bodies, 6) that make them: a
         rotation vector, then a translation, in the world frame."""
         structure, unactuated = self.robot.structure, Unactuated(self.robot.model)
-        squares, motions = linalg.eigh(*_vibration(self.robot, unactuated))
-        motions = motions[:, squares > _LEAST_SQUARE]
+        stiffness, mass, count = _vibration(self.robot, unactuated)
+        motions = linalg.eigh(stiffness, mass)[1][:, :count]
         by_body = motions.reshape(len(structure.bodies), 6, -1)
         by_body[:, :3] /= unactuated.radius
         of_bodies = by_body.transpose(2, 0, 1)
@@ -176,16 +165,27 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     return EquilibriumStudy(robot=robot, nodes=nodes, cables=table)
 
 
-def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray]:
+def _frequencies(robot: Robot, among: list[int] | None = None) -> np.ndarray:
+    """Natural frequencies in Hz, ascending; only those with indices from among[0] to among[1]."""
+    stiffness, mass, count = _vibration(robot, Unactuated(robot.model))
+    squares = linalg.eigvalsh(stiffness, mass, subset_by_index=among)[:count]
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))
+
+
+def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray, int]:
     """Stiffness matrix K and mass matrix M of small motions M x'' = -K x about the equilibrium,
     without damping. x has six coordinates per body in m, in the world frame: a rotation vector
-    times `unactuated.radius`, then a translation. Returns K and M. The forces of `unactuated` are
+    times `unactuated.radius`, then a translation. Motions that no force resists are the fastest
+    ones here. Returns K, M, and the number of the others. The forces of `unactuated` are
     overwritten."""
     state = robot.equilibrium.state
     force_at_rest(unactuated, state)
     rigid = stiffness_at_rest(unactuated).toarray()
-    stiffness = condensed(rigid, robot.structure, unactuated, state)
-    return stiffness, mass_matrix(unactuated)
+    free, mass = free_motions(unactuated, state), mass_matrix(unactuated)
+    stiffness, momenta = condensed(rigid, robot.structure, unactuated, state), mass @ free
+    above = 2.0 * np.trace(np.linalg.solve(mass, stiffness))  # twice the sum of all squares
+    lift = above * momenta @ np.linalg.solve(free.T @ momenta, momenta.T)
+    return stiffness + lift, mass, len(mass) - free.shape[1]
 
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:

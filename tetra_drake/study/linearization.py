@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.systems.controllers import LinearQuadraticRegulator
 from pydrake.systems.primitives import LinearSystem
 from scipy import linalg
 from scipy.spatial.transform import Rotation
@@ -22,22 +21,20 @@ from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.laws.rates import rates_and_forces
-from tetra_drake.robot.equilibrium import displace
+from tetra_drake.robot.equilibrium import Unactuated, displace, force_at_rest, free_motions
 from tetra_drake.robot.readings import Readings, bodies_state
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.settings.refusals import no_such
 
-LEAST_FREQUENCY = 0.05
-"""Least natural frequency in Hz. A slower mode is a motion that no force resists, such as the spin
-of a bar about its axis."""
-_SLOWEST = 2.0 * math.pi * LEAST_FREQUENCY
-
 STEP = 1e-6
 """Step of the central differences: in rad, as a share of the largest body's radius (m, and m/s), of
 the greatest force (N), and of the greatest state of an actuator. The matrices are exact to some
 1e-10 of their greatest numbers; the spin of a thin bar, whose inertia is small, to 1e-8."""
+_ROUNDED, _UNRESISTED, _SOLVED = 1e-9, 1e-7, 1e-3
+"""Greatest errors: of an eigenvalue, as a share of the greatest one; of numbers of the matrices, as
+a share of the greatest; of LQR's equation, as a share of its greatest term."""
 BALANCED = 1e-4
 """Force left at rest, at most, as a share of the greatest force."""
 
@@ -87,14 +84,20 @@ class Linearization:
     """State [q; v] (13*bodies,) about which the motions are small."""
     signals: np.ndarray
     """Signals (inputs,) in N in this state."""
+    resisted: np.ndarray
+    """Orthonormal basis (states, k), in columns, of the states without motions that no force
+    resists, such as the spin of a bar about its axis."""
 
     def modes(self) -> DampedModes:
         """The oscillations of the system: damped frequencies, damping ratios, and shapes."""
-        roots, vectors = linalg.eig(self.system.A())
-        swings = np.flatnonzero(roots.imag > _SLOWEST)
+        A, kept, bodies = self.system.A(), self.resisted, len(self.robot.structure.bodies)
+        roots, vectors = linalg.eig(kept.T @ A @ kept)
+        swings = np.flatnonzero(roots.imag > _ROUNDED * np.abs(roots).max(initial=0.0))
         swings = swings[roots.imag[swings].argsort(kind="stable")]
-        roots, bodies = roots[swings], len(self.robot.structure.bodies)
-        motions = vectors[: 6 * bodies, swings].T.reshape(-1, bodies, 6)
+        roots = roots[swings]
+        # Twice A, because it then maps the parts that are left out to 0.
+        whole = A @ (A @ (kept @ vectors[:, swings])) / roots**2
+        motions = whole[: 6 * bodies].T.reshape(-1, bodies, 6)
         shapes = node_motions(self.robot.structure, self.state, motions)
         # In this phase the real part is greatest.
         phase = np.exp(-0.5j * np.angle((shapes**2).sum(axis=(1, 2))))
@@ -109,8 +112,8 @@ class Linearization:
         """Gain K (inputs, states) of the linear-quadratic regulator (LQR): u = -K x has the least
         integral of xᵀ Q x + uᵀ R u.
 
-        Motions that no force resists, slower than 0.3 per second, are left out, because no signal
-        can hold them: a bar spins about its axis, a floating robot drifts.
+        What no force resists is left out, because no signal can hold it: a bar spins about its
+        axis, a floating robot drifts.
 
         Args:
             state_cost: the matrix Q (states, states), symmetric without negative eigenvalues.
@@ -124,16 +127,18 @@ class Linearization:
         A, B = self.system.A(), self.system.B()
         Q = _checked_cost(state_cost, len(A), "state_cost")
         R = _checked_cost(input_cost, B.shape[1], "input_cost")
-        schur, basis, count = linalg.schur(A.T, sort=lambda re, im: math.hypot(re, im) > _SLOWEST)
-        kept = basis[:, :count]  # keptᵀ x are states of their own, without the motions left out
-        cost = kept.T @ Q @ kept
+        kept = self.resisted  # keptᵀ x are states of their own, without the states left out
+        A, B, Q = kept.T @ A @ kept, kept.T @ B, kept.T @ Q @ kept
         try:
-            gain, _ = LinearQuadraticRegulator(
-                schur[:count, :count].T, kept.T @ B, 0.5 * (cost + cost.T), R
-            )
-        except (RuntimeError, ValueError, SystemExit) as error:  # Drake ends for extreme numbers
+            to_go = linalg.solve_continuous_are(A, B, Q, R)
+            gain = np.linalg.solve(R, B.T @ to_go)
+        except ValueError as error:  # also NumPy's LinAlgError
             raise InputError("lqr", "", f"finds no gain: {error}") from error
-        return _checked(gain @ kept.T, (len(R), len(Q)), source="lqr", key="gain")
+        terms = [A.T @ to_go, to_go @ A, -gain.T @ R @ gain, Q]
+        is_solved = np.abs(sum(terms)).max() < _SOLVED * np.abs(terms).max()
+        if not (is_solved and (linalg.eigvals(A - B @ gain).real < 0.0).all()):
+            raise InputError("lqr", "", "finds no gain that brings all motions to rest")
+        return np.asarray(gain @ kept.T)
 
     def controller(self, gain: npt.ArrayLike) -> Controller:
         """State feedback u = -K x: a function from the time (s) and the readings of a robot to its
@@ -219,17 +224,19 @@ def linearize(
     if state is None and left > BALANCED * greatest:
         problem = "does not rest on this terrain with these actuators; give a state"
         raise InputError(robot.scenario.name, "robot", problem)
-    matrices = _matrices(robot, at, fixed, outputs, of_signals=greatest)
-    if not all(np.isfinite(matrix).all() for matrix in matrices):
+    A, *matrices = _matrices(robot, at, fixed, outputs, of_signals=greatest)
+    if not all(np.isfinite(matrix).all() for matrix in (A, *matrices)):
         raise InputError("linearize", "state", "found a state whose forces are not finite")
+    resisted = _resisted_states(robot, at, A)
     return Linearization(
         robot=robot,
-        system=LinearSystem(*matrices),
+        system=LinearSystem(A, *matrices),
         states=_state_names(robot),
         inputs=robot.structure.oscillators,
         outputs=tuple(name for output in outputs for name in names[output]),
         state=at,
         signals=robot.first_signals,
+        resisted=resisted,
     )
 
 
@@ -311,6 +318,23 @@ def _matrices(
     jacobian, size = np.transpose(columns), ends[-1]
     of_states, of_inputs = jacobian[:, :size], jacobian[:, size:]
     return of_states[:size], of_inputs[:size], of_states[size:], of_inputs[size:]
+
+
+def _resisted_states(robot: Robot, state: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """`resisted` of a Linearization with the matrix A: all but the structure's free motions, as far
+    as nothing in A resists them, such as friction. Their forces in A, rounding errors, become 0."""
+    unactuated = Unactuated(robot.model)
+    force_at_rest(unactuated, state)
+    free, spaces = free_motions(unactuated, state), []
+    n, radii = len(free), np.repeat([unactuated.radius, 1.0], 3)
+    free /= np.tile(radii, n // 6)[:, np.newaxis]
+    for first in (0, n):  # displacements, then velocities
+        _, rates, ways = np.linalg.svd(A[n : 2 * n, first : first + n] @ free, full_matrices=False)
+        free = free @ ways[rates <= _UNRESISTED * np.abs(A[n : 2 * n, :n]).max()].T
+        spaces.append(free)
+    free = np.pad(linalg.block_diag(*spaces), ((0, len(A) - 2 * n), (0, 0)))
+    A[n:] -= A[n:] @ free @ np.linalg.pinv(free)
+    return np.asarray(linalg.null_space(free.T))
 
 
 def _forces_left(robot: Robot, state: np.ndarray, modes: np.ndarray) -> tuple[float, float]:

@@ -51,9 +51,10 @@ class Prepared:
         scenario, turns, solver = robot.scenario, driven.turns, Solver.of(model)
         cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
         tolerance = engine.tolerance_under(scenario.friction)
+        longest = engine.longest_step(robot.longest_step)
         times = motion_times(scenario.simulation, record=record)
         # The ring buffer of signals has two steps' worth of rows, or a whole command.
-        rows = max(2.0 * engine.max_step / cpg.listing_step + 32.0, len(driven.samples))
+        rows = max(2.0 * longest / cpg.listing_step + 32.0, len(driven.samples))
         sizes = sizes_of(model) | {
             "signals": structure.signals,
             "blocks": len(solver.schedule.later),
@@ -66,7 +67,7 @@ class Prepared:
         }
 
         # Heun's method is stable for an actuator up to its time constant (NaN if it has none).
-        max_step = np.fmin(engine.max_step, limits_of(model.actuator).time_constant)
+        max_step = np.fmin(longest, limits_of(model.actuator).time_constant)
         ground = model.ground._replace(heights=None)  # lanes have different numbers of heights
         constants = Constants(
             robot=solver.oriented(model)._replace(ground=ground),
@@ -92,7 +93,7 @@ class Prepared:
 
         start = allocate(LaneState, sizes)
         start.clock[loop.STATUS], start.clock[loop.DUE] = loop.DONE, times[1]
-        start.clock[loop.PLANNED] = min(look_ahead(tolerance), engine.max_step)
+        start.clock[loop.PLANNED] = min(look_ahead(tolerance), longest)
         start.clock[loop.SAMPLES] = len(driven.samples)
         start.tally.begins[0] = round(driven.steady_start, MARK_DECIMALS)
         start.step.state[:] = structure.initial_state
