@@ -14,6 +14,7 @@ from tetra_drake.laws import cable
 from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.blueprint import SAGS
 from tetra_drake.scenario.metrics import looks_for_distance
 
 LEAST_MOTION = 0.01
@@ -25,6 +26,8 @@ BINDS = 0.5
 SINKS, BEARS = 0.03, 0.01
 """Depths of a robot at rest in its ground, as shares of its height: from SINKS on it is too deep;
 BEARS is usual in a ground that is stiff enough."""
+YIELDS = 0.01
+"""Displacement of an anchor or joint that is too soft, as a share of the stretch of cables."""
 
 
 def gain_remark(robot: Robot) -> str:
@@ -76,6 +79,11 @@ def start_up_remark(robot: Robot) -> str:
     return f"within {duration:g} s no cable is actuated, as cpg.start_up is {start_up:g} s"
 
 
+def rest_remarks(robot: Robot) -> list[str]:
+    """Remarks on what gives way where the robot rests: its ground, and anchors or joints."""
+    return [remark for remark in (sinking_remark(robot), yielding_remark(robot)) if remark]
+
+
 def sinking_remark(robot: Robot) -> str:
     """Remark on a robot that sinks into its ground at rest by more than 3% of its height (SINKS).
     It names a ground stiffness that would bear the robot. It is "" otherwise, and without an
@@ -95,6 +103,34 @@ def sinking_remark(robot: Robot) -> str:
     needed = units.shown(ground.stiffness * depth / (BEARS * height), "N/m")
     sinks = f"the robot sinks into its ground by {units.shown(depth, 'm')}"
     return f"{sinks}; a ground.stiffness of {needed} would bear it"
+
+
+def yielding_remark(robot: Robot) -> str:
+    """Remark on the anchor or joint that gives way most at rest, if by more than 1% (YIELDS) of the
+    mean stretch of the cables. It names a stiffness that would hold it. It is "" otherwise, and
+    without an equilibrium."""
+    structure, units, cables = robot.structure, robot.scenario.units, robot.structure.cables
+    anchors, joints = structure.anchors, structure.joint_springs
+    names = [f"anchors.{structure.node_names[node]}" for node in anchors.nodes]
+    try:
+        equilibrium = robot.equilibrium if names or structure.joint_keys else None
+    except InputError:
+        return ""
+    if equilibrium is None or not cables.size:
+        return ""
+    p_WN = node_positions(structure, equilibrium.state)
+    moved = (p_WN[anchors.nodes] - anchors.places) * (anchors.stiffness > 0.0)
+    ways = np.linalg.norm([*moved, *(p_WN[joints.node_b] - p_WN[joints.node_a])], axis=1)
+    tension = np.maximum(equilibrium.lengths - cables["free_length"], 0.0) @ cables["stiffness"]
+    allowed = YIELDS * tension / cables["stiffness"].sum() or 2.0 * SAGS * structure.length
+    most = int(ways.argmax())
+    if ways[most] <= allowed:
+        return ""
+    own = [*anchors.stiffness.max(axis=1), *joints.stiffness][most] * ways[most] / allowed
+    needed = max(structure.firm_stiffness(robot.scenario.robot.gravity), 10.0 * own)
+    way, needs = units.shown(ways[most], "m"), units.shown(needed, "N/m")
+    gives = f"{[*names, *structure.joint_keys][most]} gives way by {way}"
+    return f"{gives}, more than 1 % of the stretch of cables; {needs} would hold it"
 
 
 def _usual_signal(robot: Robot) -> tuple[float, np.ndarray]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tetra_drake.errors import InputError, check_type
+from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.robot.statics import TOLERANCE, find_statics, null_space
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -57,10 +58,26 @@ def form_find(scenario: GivenScenario, prestress: Mapping[str, str]) -> Scenario
         wanted[group] = given_quantity(str(given), "N", _SOURCE, f"prestress.{group}")
     structure = Structure.of(robot.blueprint())
     changes: dict[str, str | None] = {}
-    for group, tension in zip(groups, _tensions(structure, groups, wanted), strict=True):
+    tensions = _tensions(structure, groups, wanted)
+    _check_range(structure, dict(zip(groups, tensions, strict=True)))
+    for group, tension in zip(groups, tensions, strict=True):
         changes[f"robot.cables.{group}.tension"] = f"{tension!r} N"
         changes[f"robot.cables.{group}.free_length"] = None
     return scenario.with_changes(changes)
+
+
+def _check_range(structure: Structure, tensions: Mapping[str, float]) -> None:
+    """Refuses tensions (N) of groups with which a cable would have no free length, and says by how
+    much they are too high."""
+    of_cables = np.array([tensions[group] for group in structure.cable_groups])
+    law = CableLaw.of(structure.cables)._replace(free_length=np.zeros(len(of_cables)))
+    most = elastic_tension(structure.initial_lengths, law)
+    worst = (of_cables / most).argmax()
+    if of_cables[worst] > most[worst]:
+        problem = f"gives '{structure.cable_names[worst]}' {of_cables[worst]:.4g} N, but its free"
+        problem += f" length is 0 at {most[worst]:.4g} N"
+        share = 100.0 * most[worst] / of_cables[worst]
+        raise InputError(_SOURCE, "prestress", f"{problem}; expected less than {share:.3g} % of it")
 
 
 def _tensions(structure: Structure, groups: list[str], wanted: Mapping[str, float]) -> list[float]:
