@@ -24,7 +24,7 @@ from tetra_drake.files import check_folder, given_path
 from tetra_drake.formatting import Say, silent
 from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import MakeOptimizer
-from tetra_drake.robot.remarks import gain_remark, rest_remarks, start_up_remark
+from tetra_drake.robot.remarks import gain_remark, sinking_remark, start_up_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
@@ -272,6 +272,6 @@ def _introduce(
         )
     if is_new:
         robot = Robot.of(manifest.scenario)
-        for remark in (start_up_remark(robot), gain_remark(robot), *rest_remarks(robot)):
+        for remark in (start_up_remark(robot), gain_remark(robot), sinking_remark(robot)):
             if remark:
                 progress.warn(remark)

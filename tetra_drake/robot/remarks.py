@@ -79,11 +79,6 @@ def start_up_remark(robot: Robot) -> str:
     return f"within {duration:g} s no cable is actuated, as cpg.start_up is {start_up:g} s"
 
 
-def rest_remarks(robot: Robot) -> list[str]:
-    """Remarks on what gives way where the robot rests: its ground, and anchors or joints."""
-    return [remark for remark in (sinking_remark(robot), yielding_remark(robot)) if remark]
-
-
 def sinking_remark(robot: Robot) -> str:
     """Remark on a robot that sinks into its ground at rest by more than 3% of its height (SINKS).
     It names a ground stiffness that would bear the robot. It is "" otherwise, and without an
@@ -107,30 +102,33 @@ def sinking_remark(robot: Robot) -> str:
 
 def yielding_remark(robot: Robot) -> str:
     """Remark on the anchor or joint that gives way most at rest, if by more than 1% (YIELDS) of the
-    mean stretch of the cables. It names a stiffness that would hold it. It is "" otherwise, and
-    without an equilibrium."""
+    mean stretch of the cables, or if steps bear no stiffer one. It names a stiffness that would
+    hold it. It is "" otherwise, and without an equilibrium."""
     structure, units, cables = robot.structure, robot.scenario.units, robot.structure.cables
     anchors, joints = structure.anchors, structure.joint_springs
     names = [f"anchors.{structure.node_names[node]}" for node in anchors.nodes]
+    names += structure.joint_keys
     try:
-        equilibrium = robot.equilibrium if names or structure.joint_keys else None
+        equilibrium = robot.equilibrium if names and cables.size else None
     except InputError:
         return ""
-    if equilibrium is None or not cables.size:
+    if equilibrium is None:
         return ""
     p_WN = node_positions(structure, equilibrium.state)
     moved = (p_WN[anchors.nodes] - anchors.places) * (anchors.stiffness > 0.0)
     ways = np.linalg.norm([*moved, *(p_WN[joints.node_b] - p_WN[joints.node_a])], axis=1)
     tension = np.maximum(equilibrium.lengths - cables["free_length"], 0.0) @ cables["stiffness"]
-    allowed = YIELDS * tension / cables["stiffness"].sum() or 2.0 * SAGS * structure.length
+    stretch = tension / cables["stiffness"].sum() or 2.0 * SAGS * structure.length / YIELDS
     most = int(ways.argmax())
-    if ways[most] <= allowed:
+    way, own = ways[most], [*anchors.stiffness.max(axis=1), *joints.stiffness][most]
+    firm, bound = structure.firm_stiffness(robot.scenario.robot.gravity)
+    if way <= YIELDS * stretch and not own == bound < firm:
         return ""
-    own = [*anchors.stiffness.max(axis=1), *joints.stiffness][most] * ways[most] / allowed
-    needed = max(structure.firm_stiffness(robot.scenario.robot.gravity), 10.0 * own)
-    way, needs = units.shown(ways[most], "m"), units.shown(needed, "N/m")
-    gives = f"{[*names, *structure.joint_keys][most]} gives way by {way}"
-    return f"{gives}, more than 1 % of the stretch of cables; {needs} would hold it"
+    needed = units.shown(max(firm, 0.1 * own * way / (YIELDS**2 * stretch)), "N/m")
+    share = f"{100.0 * way / stretch:.2g} % of" if tension else "without"
+    gives = f"at rest {names[most]} gives way by {units.shown(way, 'm')}, {share} stretch of cables"
+    light = ", more than steps of its lightest body bear" if own == bound < firm else ""
+    return f"{gives}; {needed} would hold it{light}"
 
 
 def _usual_signal(robot: Robot) -> tuple[float, np.ndarray]:

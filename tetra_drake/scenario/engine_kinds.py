@@ -60,13 +60,16 @@ class Compiled(EngineSettings):
     module: ClassVar[str] = "tetra_drake.engines.lanes.batch"
     tolerance: Speed | None = Field(default=None, gt=0)
     """Permitted error per step of the velocity of a body; for rotations, of its strut tips. If not
-    given, 0.1 mm/s; 5 mm/s where nodes never slip, as with `friction.reset: range`."""
+    given, 0.1 mm/s; 5 mm/s where nodes never slip, as with `friction.reset: range`; a tenth of it
+    for robots with joints."""
     max_step: Time = Field(default=0.003, gt=SHORTEST_STEP, le=1)
     """Longest step."""
 
-    def tolerance_under(self, friction: FrictionKind) -> float:
-        """The tolerance in m/s; if not given, the default for this friction."""
-        return self.tolerance or (5e-3 if friction.never_slips else 1e-4)
+    def tolerance_under(self, friction: FrictionKind, *, is_jointed: bool) -> float:
+        """The tolerance in m/s; if not given, the default for this friction, with or without
+        joints."""
+        usual = 5e-3 if friction.never_slips else 1e-4
+        return self.tolerance or (0.1 * usual if is_jointed else usual)
 
 
 def look_ahead(tolerance: float) -> float:

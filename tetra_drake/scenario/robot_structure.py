@@ -274,7 +274,8 @@ class StructureFile(RobotSettings):
     anchor_stiffness: Stiffness | None = Field(default=None, gt=0)
     """Stiffness that holds a node of a strut along each axis of its anchor. By default it is 1000
     times the stiffness of all cables, and at least so great that the robot's weight moves the node
-    by a hundredth of a millimetre per metre of the robot's length."""
+    by a hundredth of a millimetre per metre of the robot's length; but at most 1e14 / s² times the
+    mass of the lightest body."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness of an anchor. With less than 1 ms, a stiff anchor vibrates, and
     steps are short."""
@@ -349,7 +350,7 @@ class StructureFile(RobotSettings):
         )
         if not (self.joints or held.any()):
             return blueprint
-        firm = blueprint.firm_stiffness(self.gravity)
+        firm = min(blueprint.firm_stiffness(self.gravity))
         anchors, of_joints = self.anchor_stiffness or firm, self.joint_stiffness or firm
         joints = np.array([joint.stiffness or of_joints for joint in self.joints.values()])
         return dataclasses.replace(

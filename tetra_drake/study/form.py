@@ -67,17 +67,16 @@ def form_find(scenario: GivenScenario, prestress: Mapping[str, str]) -> Scenario
 
 
 def _check_range(structure: Structure, tensions: Mapping[str, float]) -> None:
-    """Refuses tensions (N) of groups with which a cable would have no free length, and says by how
-    much they are too high."""
-    of_cables = np.array([tensions[group] for group in structure.cable_groups])
-    law = CableLaw.of(structure.cables)._replace(free_length=np.zeros(len(of_cables)))
+    """Refuses tensions (N) of groups that would leave a cable no free length."""
+    found = np.array([tensions[group] for group in structure.cable_groups])
+    law = CableLaw.of(structure.cables)._replace(free_length=0.0 * found)
     most = elastic_tension(structure.initial_lengths, law)
-    worst = (of_cables / most).argmax()
-    if of_cables[worst] > most[worst]:
-        problem = f"gives '{structure.cable_names[worst]}' {of_cables[worst]:.4g} N, but its free"
-        problem += f" length is 0 at {most[worst]:.4g} N"
-        share = 100.0 * most[worst] / of_cables[worst]
-        raise InputError(_SOURCE, "prestress", f"{problem}; expected less than {share:.3g} % of it")
+    worst = (found / most).argmax()
+    if found[worst] > most[worst]:
+        name, limit = structure.cable_names[worst], f"{most[worst]:.4g} N"
+        problem = f"gives '{name}' {found[worst]:.4g} N, but its free length is 0 at {limit}"
+        share = 99.9 * most[worst] / found[worst]
+        raise InputError(_SOURCE, "prestress", f"{problem}; expected {share:.4g} % of it at most")
 
 
 def _tensions(structure: Structure, groups: list[str], wanted: Mapping[str, float]) -> list[float]:
