@@ -105,15 +105,15 @@ def test_bodies_may_be_joined_by_the_world_alone():
 def test_a_guyed_mast_of_any_size_keeps_its_tension_and_the_frequency_of_a_rigid_foot(scale):
     study = study_equilibrium(Robot.of(scenario_of(guyed_mast(scale))))
     tension, rope = TENSION * scale**2, math.hypot(SIZE, SPREAD) * scale
-    assert study.cables.tension == pytest.approx([tension] * 3, rel=1e-3)
+    assert study.cables.tension.to_numpy() == pytest.approx(tension, rel=3e-3)
     # Horizontal stiffness at the top: of the guys, elastic and by tension, less the thrust's.
     cos2, mass = (SPREAD * scale / rope) ** 2, study.robot.structure.mass.sum()
     lateral = 3e6 * scale * cos2 - 1.5 * tension / rope * cos2 - mass * G / (2.0 * SIZE * scale)
     swing = math.sqrt(3.0 * lateral / mass) / (2.0 * math.pi)
     assert study.frequencies[:2] == pytest.approx([swing, swing], rel=1e-4)
     stretch = tension / (2e6 * scale)
-    assert -study.nodes.z["foot"] < 1e-3 * stretch
-    assert yielding_remark(study.robot) == ""
+    assert -study.nodes.z["foot"] < 3e-3 * stretch  # the foot bears three guys
+    assert (yielding_remark(study.robot) == "") == (scale >= 1.0), "the small one has a bound"
 
 
 def test_a_foot_that_gives_way_by_a_twentieth_of_the_guys_stretch_is_told():

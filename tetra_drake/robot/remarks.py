@@ -102,8 +102,8 @@ def sinking_remark(robot: Robot) -> str:
 
 def yielding_remark(robot: Robot) -> str:
     """Remark on the anchor or joint that gives way most at rest, if by more than 1% (YIELDS) of the
-    mean stretch of the cables, or if steps bear no stiffer one. It names a stiffness that would
-    hold it. It is "" otherwise, and without an equilibrium."""
+    mean stretch of the cables, or by 0.1% where its default is bounded. It names a stiffness that
+    would hold it. It is "" otherwise, and without an equilibrium."""
     structure, units, cables = robot.structure, robot.scenario.units, robot.structure.cables
     anchors, joints = structure.anchors, structure.joint_springs
     names = [f"anchors.{structure.node_names[node]}" for node in anchors.nodes]
@@ -122,12 +122,13 @@ def yielding_remark(robot: Robot) -> str:
     most = int(ways.argmax())
     way, own = ways[most], [*anchors.stiffness.max(axis=1), *joints.stiffness][most]
     firm, bound = structure.firm_stiffness(robot.scenario.robot.gravity)
-    if way <= YIELDS * stretch and not own == bound < firm:
+    is_bound = own == bound < firm
+    if way <= (0.1 if is_bound else 1.0) * YIELDS * stretch:
         return ""
-    needed = units.shown(max(firm, 0.1 * own * way / (YIELDS**2 * stretch)), "N/m")
+    needed = units.shown(max(firm, own * way / (0.1 * YIELDS * stretch)), "N/m")
     share = f"{100.0 * way / stretch:.2g} % of" if tension else "without"
     gives = f"at rest {names[most]} gives way by {units.shown(way, 'm')}, {share} stretch of cables"
-    light = ", more than steps of its lightest body bear" if own == bound < firm else ""
+    light = ", but with shorter steps" if is_bound else ""
     return f"{gives}; {needed} would hold it{light}"
 
 

@@ -37,9 +37,9 @@ LIGHTEST = 1e-12
 SAGS, HOLDS = 1e-5, 1e3
 """Displacement of an anchor or joint under the robot's weight, as a share of the robot's length;
 and its stiffness as a multiple of the stiffness of all cables."""
-BEARS = 1e14
-"""Greatest stiffness (N/m) of anchors and joints per mass (kg) of the lightest body. Rounding of
-positions then shakes it by 0.02 m/s² per metre of its distance from the origin."""
+STIFFEST = 1e8
+"""Stiffness (N/m) of anchors and joints per mass (kg) of the lightest body, above which steps are
+short and errors larger where bodies swing. No cable needs more than HOLDS times its own."""
 
 LEAST_DISTANCE = 1e-3
 """Least distance between two nodes, as a share of the shortest strut."""
@@ -313,15 +313,15 @@ class Blueprint:
 
     def firm_stiffness(self, gravity: float) -> tuple[float, float]:
         """Stiffness (N/m) of anchors and joints that hardly give way, neither to all cables nor to
-        the robot's weight, on earth at least, and its loads; and the greatest that steps bear. See
-        HOLDS, SAGS and BEARS."""
+        the robot's weight, on earth at least, and its loads; and the greatest default, with which
+        steps are still long. See HOLDS, SAGS and STIFFEST."""
         mass = self._masses(self.node_mass)
         for body, given in self.given_inertia.items():
             mass[body] = mass[body] if given.mass is None else given.mass
         weight = mass.sum() * max(gravity, 9.80665) + np.abs(self.node_load).sum()
-        cables = sum(law["stiffness"] for law in self.cable_laws)
-        firm = max(HOLDS * cables, float(weight) / (SAGS * (self.length or 1.0)))
-        return firm, BEARS * float(mass.min())
+        cables = [HOLDS * law["stiffness"] for law in self.cable_laws]
+        firm = max(sum(cables), float(weight) / (SAGS * (self.length or 1.0)))
+        return firm, max([STIFFEST * float(mass.min()), *cables])
 
     def _masses(self, points: np.ndarray) -> np.ndarray:
         """Masses (bodies,) of struts, spheres and `points` (nodes,), masses at the nodes."""

@@ -274,8 +274,8 @@ class StructureFile(RobotSettings):
     anchor_stiffness: Stiffness | None = Field(default=None, gt=0)
     """Stiffness that holds a node of a strut along each axis of its anchor. By default it is 1000
     times the stiffness of all cables, and at least so great that the robot's weight moves the node
-    by a hundredth of a millimetre per metre of the robot's length; but at most 1e14 / s² times the
-    mass of the lightest body."""
+    by a hundredth of a millimetre per metre of the robot's length. It is no greater than 1e8 / s²
+    times the mass of the lightest body, or 1000 times the stiffness of the stiffest cable."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness of an anchor. With less than 1 ms, a stiff anchor vibrates, and
     steps are short."""
