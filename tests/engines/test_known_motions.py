@@ -131,6 +131,13 @@ def test_what_hangs_swings_as_analysis_says(make, expected, atol, engine):
     assert np.ptp(p_WN, axis=0).max() > 0.015
 
 
+def test_by_default_two_bars_on_joints_swing_for_two_seconds_as_analysis_says():
+    robot = joined.folded(2.0)
+    trajectory = trajectory_of(robot, "!Compiled")
+    expected = joined.as_a_double_pendulum(robot, trajectory.time.values)
+    np.testing.assert_allclose(trajectory.p_WN, expected, atol=2e-4)
+
+
 def bent_body_and_bar() -> Robot:
     """Two bodies, one of three different moments, and a cable that hangs loose between them."""
     bent = {"a": [0, 0, 0.5], "b": [0.1, 0, 0.5], "c": [0.1, 0.06, 0.5], "d": [0.1, 0.06, 0.52]}

@@ -168,9 +168,9 @@ def along(angle: np.ndarray) -> np.ndarray:
 LEANS = 0.5, 1.0
 
 
-def folded() -> Robot:
+def folded(duration: float = 0.4) -> Robot:
     """The double pendulum with both bars aslant."""
-    robot = Robot.of(scenario_of(DOUBLE, duration=0.4))
+    robot = Robot.of(scenario_of(DOUBLE, duration=duration))
     knee = np.array([0.0, 0.0, -UPPER]), UPPER * along(np.array(LEANS[0]))
     pivots = {0: np.zeros((2, 3)), 1: np.array(knee)}
     return turned(robot, dict(enumerate(LEANS)), pivots)

@@ -5,12 +5,33 @@ import math
 import numpy as np
 import pytest
 from helpers.anchored import BAR, HUNG, SWINGING, scenario_of, supported_prism
+from helpers.joined import DOUBLE, RHOMBUS
 
+from tetra_drake.robot.remarks import yielding_remark
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.study.equilibrium import structure_text, study_equilibrium
 
 G = 9.80665
+TENSION, SIZE, SPREAD = 2e4, 10.0, 6.0
+
+
+def guyed_mast(scale: float = 1.0, **changes: object) -> dict[str, object]:
+    """A steel mast on a pin, held by three steel guys; of another size, with the same stresses."""
+    places = {f"g{i}": math.tau * i / 3 for i in range(3)}
+    nodes = {node: [SPREAD * math.cos(a), SPREAD * math.sin(a), 0.0] for node, a in places.items()}
+    nodes |= {"foot": [0.0, 0.0, 0.0], "top": [0.0, 0.0, SIZE]}
+    guy = {"stiffness": 2e6 * scale, "damping": 5e2 * scale**2, "tension": TENSION * scale**2}
+    mast = {"diameter": 0.1 * scale, "density": 7850.0, "node_diameter": 0.0}
+    return {
+        "nodes": {node: [scale * x for x in place] for node, place in nodes.items()},
+        "struts": {"mast": mast | {"pairs": [["foot", "top"]]}},
+        "cables": {"guy": guy | {"pairs": [[node, "top"] for node in places]}},
+        "anchors": dict.fromkeys(["foot", *places], "xyz"),
+    } | changes
+
+
 K = 200.0  # N/m, of the cable of HUNG
 
 
@@ -78,3 +99,43 @@ def test_bodies_may_be_joined_by_the_world_alone():
     bars = {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}}
     tree = {"nodes": two, "struts": bars, "anchors": {"a": "xyz", "c": "xyz"}}
     assert StructureFile.model_validate(tree).body_count == 2
+
+
+@pytest.mark.parametrize("scale", [5e-4, 1.0, 20.0])
+def test_a_guyed_mast_of_any_size_keeps_its_tension_and_the_frequency_of_a_rigid_foot(scale):
+    study = study_equilibrium(Robot.of(scenario_of(guyed_mast(scale))))
+    tension, rope = TENSION * scale**2, math.hypot(SIZE, SPREAD) * scale
+    assert study.cables.tension.to_numpy() == pytest.approx(tension, rel=3e-3)
+    # Horizontal stiffness at the top: of the guys, elastic and by tension, less the thrust's.
+    cos2, mass = (SPREAD * scale / rope) ** 2, study.robot.structure.mass.sum()
+    lateral = 3e6 * scale * cos2 - 1.5 * tension / rope * cos2 - mass * G / (2.0 * SIZE * scale)
+    swing = math.sqrt(3.0 * lateral / mass) / (2.0 * math.pi)
+    assert study.frequencies[:2] == pytest.approx([swing, swing], rel=1e-4)
+    stretch = tension / (2e6 * scale)
+    assert -study.nodes.z["foot"] < 3e-3 * stretch  # the foot bears three guys
+    assert (yielding_remark(study.robot) == "") == (scale >= 1.0), "the small one has a bound"
+
+
+def test_a_foot_that_gives_way_by_a_twentieth_of_the_guys_stretch_is_told():
+    robot = Robot.of(scenario_of(guyed_mast(anchor_stiffness=1e8)))
+    told, foot = yielding_remark(robot), -node_positions(robot.structure, robot.equilibrium.state)
+    assert "anchors.foot" in told
+    assert f"{foot[robot.structure.node_names.index('foot'), 2]:.4g} m" in told
+    assert told[1:] in structure_text(study_equilibrium(robot))
+
+
+def test_joints_and_pins_without_a_stiffness_of_their_own_have_the_key_or_follow_the_robot():
+    def stiffness(**changes: object) -> list[float]:
+        return StructureFile.model_validate(RHOMBUS | changes).blueprint().joint_stiffness.tolist()
+
+    assert stiffness() == pytest.approx([1e3 * (1e3 + 1e3)] * 4)
+    assert stiffness(joint_stiffness=3e4) == [3e4] * 4
+    knee = {"knee": {"nodes": ["b", "c"], "stiffness": 5e4}}
+    blueprint = StructureFile.model_validate(DOUBLE | {"joints": knee, "joint_stiffness": 3e4})
+    assert blueprint.blueprint().joint_stiffness == [5e4]
+
+
+def test_without_cables_the_weight_moves_an_anchor_by_a_hundredth_of_a_millimetre_per_metre():
+    bar = {key: value for key, value in SWINGING.items() if key != "anchor_stiffness"}
+    study = study_equilibrium(Robot.of(scenario_of(bar)))
+    assert -study.nodes.z["a"] == pytest.approx(1e-5 * 0.4, rel=1e-6)

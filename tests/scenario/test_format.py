@@ -33,8 +33,10 @@ def test_the_example_has_what_its_page_says() -> None:
     pairs = [[names[node] for node in joint] for joint in blueprint.joints]
     assert blueprint.joint_keys == ("joints.knee", "joints.mid-2")
     assert pairs == [["low", "eye"], ["mid", "mid-2"]]
-    assert blueprint.joint_stiffness.tolist() == [1e5, 1e5]
-    assert blueprint.joint_damping.tolist() == [100.0, 100.0]
+    # The sling and two guys of 500 N/m.
+    assert blueprint.joint_stiffness.tolist() == pytest.approx([1e5, 1e3 * 3 * 500.0])
+    assert blueprint.joint_damping == pytest.approx(1e-3 * blueprint.joint_stiffness)
+    assert blueprint.anchor_stiffness[names.index("top")] == pytest.approx([1.5e6] * 3)
     [(body, given)] = blueprint.given_inertia.items()
     assert (body, given.mass) == (2, 0.2)
     assert given.centre == pytest.approx([0.0, 0.0, 0.18])

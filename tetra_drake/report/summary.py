@@ -12,7 +12,12 @@ from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.formatting import TextTable, fixed, rounded, sentence, uncertain
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.remarks import sinking_remark, start_up_remark, stillness_remark
+from tetra_drake.robot.remarks import (
+    sinking_remark,
+    start_up_remark,
+    stillness_remark,
+    yielding_remark,
+)
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.metrics import (
@@ -103,7 +108,7 @@ def result_text(result: SimulationResult) -> str:
         lines.append("A cable had to push: this gait cannot be built.")
     robot = result.robot
     still = stillness_remark(robot, vars(metrics)) if result.gait else ""
-    remarks = start_up_remark(robot) or still, sinking_remark(robot)
+    remarks = start_up_remark(robot) or still, sinking_remark(robot), yielding_remark(robot)
     lines += [sentence(remark) for remark in remarks if remark]
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]

@@ -14,6 +14,7 @@ from tetra_drake.laws import cable
 from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.blueprint import SAGS
 from tetra_drake.scenario.metrics import looks_for_distance
 
 LEAST_MOTION = 0.01
@@ -25,6 +26,8 @@ BINDS = 0.5
 SINKS, BEARS = 0.03, 0.01
 """Depths of a robot at rest in its ground, as shares of its height: from SINKS on it is too deep;
 BEARS is usual in a ground that is stiff enough."""
+YIELDS = 0.01
+"""Displacement of an anchor or joint that is too soft, as a share of the stretch of cables."""
 
 
 def gain_remark(robot: Robot) -> str:
@@ -95,6 +98,38 @@ def sinking_remark(robot: Robot) -> str:
     needed = units.shown(ground.stiffness * depth / (BEARS * height), "N/m")
     sinks = f"the robot sinks into its ground by {units.shown(depth, 'm')}"
     return f"{sinks}; a ground.stiffness of {needed} would bear it"
+
+
+def yielding_remark(robot: Robot) -> str:
+    """Remark on the anchor or joint that gives way most at rest, if by more than 1% (YIELDS) of the
+    mean stretch of the cables, or by 0.1% where its default is bounded. It names a stiffness that
+    would hold it. It is "" otherwise, and without an equilibrium."""
+    structure, units, cables = robot.structure, robot.scenario.units, robot.structure.cables
+    anchors, joints = structure.anchors, structure.joint_springs
+    names = [f"anchors.{structure.node_names[node]}" for node in anchors.nodes]
+    names += structure.joint_keys
+    try:
+        equilibrium = robot.equilibrium if names and cables.size else None
+    except InputError:
+        return ""
+    if equilibrium is None:
+        return ""
+    p_WN = node_positions(structure, equilibrium.state)
+    moved = (p_WN[anchors.nodes] - anchors.places) * (anchors.stiffness > 0.0)
+    ways = np.linalg.norm([*moved, *(p_WN[joints.node_b] - p_WN[joints.node_a])], axis=1)
+    tension = np.maximum(equilibrium.lengths - cables["free_length"], 0.0) @ cables["stiffness"]
+    stretch = tension / cables["stiffness"].sum() or 2.0 * SAGS * structure.length / YIELDS
+    most = int(ways.argmax())
+    way, own = ways[most], [*anchors.stiffness.max(axis=1), *joints.stiffness][most]
+    firm, bound = structure.firm_stiffness(robot.scenario.robot.gravity)
+    is_bound = own == bound < firm
+    if way <= (0.1 if is_bound else 1.0) * YIELDS * stretch:
+        return ""
+    needed = units.shown(max(firm, own * way / (0.1 * YIELDS * stretch)), "N/m")
+    share = f"{100.0 * way / stretch:.2g} % of" if tension else "without"
+    gives = f"at rest {names[most]} gives way by {units.shown(way, 'm')}, {share} stretch of cables"
+    light = ", but with shorter steps" if is_bound else ""
+    return f"{gives}; {needed} would hold it{light}"
 
 
 def _usual_signal(robot: Robot) -> tuple[float, np.ndarray]:

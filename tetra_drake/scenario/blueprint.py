@@ -34,6 +34,13 @@ about the axis would be too small beside the others."""
 LIGHTEST = 1e-12
 """Least mass of a strut, in kg."""
 
+SAGS, HOLDS = 1e-5, 1e3
+"""Displacement of an anchor or joint under the robot's weight, as a share of the robot's length;
+and its stiffness as a multiple of the stiffness of all cables."""
+STIFFEST = 1e8
+"""Stiffness (N/m) of anchors and joints per mass (kg) of the lightest body, above which steps are
+short and errors larger where bodies swing. No cable needs more than HOLDS times its own."""
+
 LEAST_DISTANCE = 1e-3
 """Least distance between two nodes, as a share of the shortest strut."""
 
@@ -304,19 +311,37 @@ class Blueprint:
             if 0.0 < mass < LIGHTEST:
                 refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
 
+    def firm_stiffness(self, gravity: float) -> tuple[float, float]:
+        """Stiffness (N/m) of anchors and joints that hardly give way, neither to all cables nor to
+        the robot's weight, on earth at least, and its loads; and the greatest default, with which
+        steps are still long. See HOLDS, SAGS and STIFFEST."""
+        mass = self._masses(self.node_mass)
+        for body, given in self.given_inertia.items():
+            mass[body] = mass[body] if given.mass is None else given.mass
+        weight = mass.sum() * max(gravity, 9.80665) + np.abs(self.node_load).sum()
+        cables = [HOLDS * law["stiffness"] for law in self.cable_laws]
+        firm = max(sum(cables), float(weight) / (SAGS * (self.length or 1.0)))
+        return firm, max([STIFFEST * float(mass.min()), *cables])
+
+    def _masses(self, points: np.ndarray) -> np.ndarray:
+        """Masses (bodies,) of struts, spheres and `points` (nodes,), masses at the nodes."""
+        moving = self.first_node[-1]
+        of_struts = math.pi * self.strut_radius**2 * self.strut_density
+        of_struts *= self._distances(self.struts)
+        of_nodes = 4.0 / 3.0 * math.pi * self.node_radius**3 * self.node_density + points
+        mass = np.add.reduceat(of_nodes[:moving], self.first_node[:-1])
+        np.add.at(mass, self.carriers[self.struts[:, 0]], of_struts)
+        return np.asarray(mass)
+
     def check_masses(self) -> None:
         """Raises InputError for bodies of hardly any mass.
 
         The point masses of a body with several nodes do not count, as they have no inertia about
         the line between two of them.
         """
-        sizes, moving = np.diff(self.first_node), self.first_node[-1]
-        of_struts = math.pi * self.strut_radius**2 * self.strut_density
-        of_struts *= self._distances(self.struts)
-        of_nodes = 4.0 / 3.0 * math.pi * self.node_radius**3 * self.node_density
-        of_nodes[:moving] += np.where(np.repeat(sizes, sizes) == 1, self.node_mass[:moving], 0.0)
-        mass = np.add.reduceat(of_nodes[:moving], self.first_node[:-1])
-        np.add.at(mass, self.carriers[self.struts[:, 0]], of_struts)
+        sizes = np.diff(self.first_node)
+        is_alone = np.append(sizes, 0)[self.carriers] == 1  # 0 for the world
+        mass = self._masses(np.where(is_alone, self.node_mass, 0.0))
         for body, given in self.given_inertia.items():
             for key, value in (("centre", given.centre), ("inertia", given.inertia)):
                 if mass[body] < LIGHTEST and value is None:

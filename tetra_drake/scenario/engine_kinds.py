@@ -61,7 +61,8 @@ class Compiled(EngineSettings):
     module: ClassVar[str] = "tetra_drake.engines.lanes.batch"
     tolerance: Speed | None = Field(default=None, gt=0)
     """Permitted error per step of the velocity of a body; for rotations, of its strut tips. If not
-    given, 0.1 mm/s; 5 mm/s where friction is nearly viscous, as in the scenario thesis."""
+    given, 0.1 mm/s; 5 mm/s where friction is nearly viscous, as in the scenario thesis; a tenth of
+    it for robots with joints."""
     max_step: Time = Field(default=_LONGEST_STEP, gt=SHORTEST_STEP, le=1)
     """Longest step. The default becomes shorter where damping is light, as for !Drake."""
 
@@ -69,9 +70,12 @@ class Compiled(EngineSettings):
         """The longest step (s): `max_step`, or `light` if that is less than the default."""
         return self.max_step if self.max_step != _LONGEST_STEP else min(_LONGEST_STEP, light)
 
-    def tolerance_under(self, friction: FrictionKind) -> float:
-        """The tolerance in m/s; if not given, the default for this friction."""
-        return self.tolerance or (5e-3 if friction.is_viscous else 1e-4)
+
+    def tolerance_under(self, friction: FrictionKind, *, is_jointed: bool) -> float:
+        """The tolerance in m/s; if not given, the default for this friction, with or without
+        joints."""
+        usual = 5e-3 if friction.is_viscous else 1e-4
+        return self.tolerance or (0.1 * usual if is_jointed else usual)
 
 
 def look_ahead(tolerance: float) -> float:

@@ -183,8 +183,8 @@ class BallJoint(Section):
 
     nodes: Pair
     """Nodes of two bodies at one place."""
-    stiffness: Stiffness = Field(default=1e5, gt=0)
-    """Force per distance of the two nodes."""
+    stiffness: Stiffness | None = Field(default=None, gt=0)
+    """Force per distance of the two nodes; by default `joint_stiffness`."""
     time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness. With less than 1 ms, a stiff joint vibrates, and steps are
     short."""
@@ -254,6 +254,9 @@ class StructureFile(RobotSettings):
     """Nodes at which struts of several bodies are held together by ball joints. Without, struts
     that share a node are one body. The first strut's body has the node; each other body has a copy
     of it, such as n-2 and n-3 for n, and a joint with the same name."""
+    joint_stiffness: Stiffness | None = Field(default=None, gt=0)
+    """Stiffness of pinned nodes, and of joints that give none. The default is the same as for
+    anchors."""
     bodies: Keyed[Name, JoinedBody] = Field(default={})
     actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Names of the cables that each oscillator drives, such as side a b. The nodes in a name may
@@ -268,8 +271,11 @@ class StructureFile(RobotSettings):
     anchors: Keyed[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
-    anchor_stiffness: Stiffness = Field(default=1e5, gt=0)
-    """Stiffness that holds a node of a strut along each axis of its anchor."""
+    anchor_stiffness: Stiffness | None = Field(default=None, gt=0)
+    """Stiffness that holds a node of a strut along each axis of its anchor. By default it is 1000
+    times the stiffness of all cables, and at least so great that the robot's weight moves the node
+    by a hundredth of a millimetre per metre of the robot's length. It is no greater than 1e8 / s²
+    times the mass of the lightest body, or 1000 times the stiffness of the stiffest cable."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness of an anchor. With less than 1 ms, a stiff anchor vibrates, and
     steps are short."""
@@ -311,7 +317,7 @@ class StructureFile(RobotSettings):
         cables = self._cables_of(number, body_of)
         numbers = cable_numbers(cables["cable_names"])
 
-        return Blueprint(
+        blueprint = Blueprint(
             bodies=self._names_of_bodies(bodies, nodes),
             node_names=nodes,
             first_node=first_node,
@@ -325,8 +331,8 @@ class StructureFile(RobotSettings):
             **self._spheres(number, held),
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
-            anchor_stiffness=self.anchor_stiffness * held,
-            anchor_damping=self.anchor_stiffness * self.anchor_time_constant * held,
+            anchor_stiffness=held.astype(float),  # per stiffness, as joints
+            anchor_damping=self.anchor_time_constant * held,
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
             **cables,
@@ -341,6 +347,18 @@ class StructureFile(RobotSettings):
                 tuple(numbers[name] for name in names if name in numbers)
                 for names in self.actuated.values()
             ),
+        )
+        if not (self.joints or held.any()):
+            return blueprint
+        firm = min(blueprint.firm_stiffness(self.gravity))
+        anchors, of_joints = self.anchor_stiffness or firm, self.joint_stiffness or firm
+        joints = np.array([joint.stiffness or of_joints for joint in self.joints.values()])
+        return dataclasses.replace(
+            blueprint,
+            anchor_stiffness=anchors * blueprint.anchor_stiffness,
+            anchor_damping=anchors * blueprint.anchor_damping,
+            joint_stiffness=joints,
+            joint_damping=joints * blueprint.joint_damping,
         )
 
     def _cables_of(self, number: Mapping[str, int], body_of: Mapping[str, int]) -> dict[str, Any]:
@@ -382,8 +400,7 @@ class StructureFile(RobotSettings):
         return {
             "joints": np.array(pairs, dtype=int).reshape(-1, 2),
             "joint_keys": tuple(f"joints.{name}" for name in self.joints),
-            "joint_stiffness": np.array([joint.stiffness for joint in joints]),
-            "joint_damping": np.array([joint.stiffness * joint.time_constant for joint in joints]),
+            "joint_damping": np.array([joint.time_constant for joint in joints]),
         }
 
     def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> dict[str, Any]:

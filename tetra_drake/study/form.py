@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tetra_drake.errors import InputError, check_type
+from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.robot.statics import TOLERANCE, find_statics, null_space
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -57,10 +58,25 @@ def form_find(scenario: GivenScenario, prestress: Mapping[str, str]) -> Scenario
         wanted[group] = given_quantity(str(given), "N", _SOURCE, f"prestress.{group}")
     structure = Structure.of(robot.blueprint())
     changes: dict[str, str | None] = {}
-    for group, tension in zip(groups, _tensions(structure, groups, wanted), strict=True):
+    tensions = _tensions(structure, groups, wanted)
+    _check_range(structure, dict(zip(groups, tensions, strict=True)))
+    for group, tension in zip(groups, tensions, strict=True):
         changes[f"robot.cables.{group}.tension"] = f"{tension!r} N"
         changes[f"robot.cables.{group}.free_length"] = None
     return scenario.with_changes(changes)
+
+
+def _check_range(structure: Structure, tensions: Mapping[str, float]) -> None:
+    """Refuses tensions (N) of groups that would leave a cable no free length."""
+    found = np.array([tensions[group] for group in structure.cable_groups])
+    law = CableLaw.of(structure.cables)._replace(free_length=0.0 * found)
+    most = elastic_tension(structure.initial_lengths, law)
+    worst = (found / most).argmax()
+    if found[worst] > most[worst]:
+        name, limit = structure.cable_names[worst], f"{most[worst]:.4g} N"
+        problem = f"gives '{name}' {found[worst]:.4g} N, but its free length is 0 at {limit}"
+        share = 99.9 * most[worst] / found[worst]
+        raise InputError(_SOURCE, "prestress", f"{problem}; expected {share:.4g} % of it at most")
 
 
 def _tensions(structure: Structure, groups: list[str], wanted: Mapping[str, float]) -> list[float]:

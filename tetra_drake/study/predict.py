@@ -38,6 +38,7 @@ from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, Driver
 from tetra_drake.robot.gait import GivenGait, given_gait, with_body
+from tetra_drake.robot.remarks import yielding_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import stream
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario, save_scenario
@@ -109,7 +110,8 @@ class Predictions:
 
     @property
     def notes(self) -> list[str]:
-        """How many draws lack a quantity, with a reason, and whether shares are missing."""
+        """How many draws lack a quantity, with a reason, whether shares are missing, and what gives
+        way at rest."""
         count, reasons = len(self.draws), [text for text in self.draws["failure"] if text]
         failed = f"{len(reasons)} of {count} draws have no result and are left out"
         notes = [f"{failed}, the first because: {reasons[0]}"] if reasons else []
@@ -117,7 +119,8 @@ class Predictions:
         notes += [f"{n} of {count} draws have no {name}" for name, n in lacking.items() if n]
         if self.shares.isna().all(axis=None):
             notes.append("the shares need more draws, or quantities that vary")
-        return notes
+        gives_way = yielding_remark(Robot.of(self.scenario, at_rest=True))
+        return [*notes, gives_way] if gives_way else notes
 
     @property
     def table(self) -> TextTable:

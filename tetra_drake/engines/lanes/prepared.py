@@ -50,8 +50,9 @@ class Prepared:
         robot, model, structure = driven.robot, driven.robot.model, driven.robot.structure
         scenario, turns, solver = robot.scenario, driven.turns, Solver.of(model)
         cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
-        tolerance = engine.tolerance_under(scenario.friction)
         longest = engine.longest_step(robot.longest_step)
+        is_jointed = model.joints.node_a.size > 0
+        tolerance = engine.tolerance_under(scenario.friction, is_jointed=is_jointed)
         times = motion_times(scenario.simulation, record=record)
         # The ring buffer of signals has two steps' worth of rows, or a whole command.
         rows = max(2.0 * longest / cpg.listing_step + 32.0, len(driven.samples))
