@@ -14,7 +14,7 @@ import operator
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 import pydantic
@@ -36,6 +36,7 @@ from tetra_drake.scenario.structure_graph import (
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.quantities import (
     Acceleration,
+    Damping,
     Density,
     ForceQuantity,
     InertiaQuantity,
@@ -78,9 +79,11 @@ def _check_name(name: object) -> object:
 
 
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
+Number = TypeVar("Number")
 BareLength = Annotated[Length, Field(json_schema_extra={"if": False})]
 """A length that needs no unit where the structure has one."""
 Coordinates = Annotated[list[BareLength], Field(min_length=3, max_length=3)]
+PerAxis = Annotated[list[Annotated[Number, Field(ge=0)]], Field(min_length=3, max_length=3)]
 CablePath = Annotated[list[str], Field(min_length=2, max_length=MOST_NODES)]
 AnchorAxes = Annotated[
     Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
@@ -237,7 +240,10 @@ class StructureFile(RobotSettings):
     """A tensegrity: nodes, struts, cables and the oscillators that actuate cables."""
 
     tag: ClassVar[str] = "Structure"
-    keys_of_files: ClassVar = {"file": "Name or file of a structure; the other keys change it."}
+    keys_of_files: ClassVar = {
+        "file": "Name or file of a structure; the other keys change it.",
+        "without": "Names of bodies of a file of MuJoCo that are left out, separated by commas.",
+    }
 
     format: Literal[1] = Field(default=1, exclude=True)
     """Version of the format of the file."""
@@ -265,6 +271,10 @@ class StructureFile(RobotSettings):
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
+    springs: Keyed[str, PerAxis[Stiffness]] = Field(default={}, exclude_if=operator.not_)
+    """Stiffness [x, y, z] of springs between nodes of bodies and their places in the file."""
+    dampers: Keyed[str, PerAxis[Damping]] = Field(default={}, exclude_if=operator.not_)
+    """Damping [x, y, z] of nodes of bodies, such as of a float in water."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
@@ -304,6 +314,8 @@ class StructureFile(RobotSettings):
         number = {node: index for index, node in enumerate(nodes)}
         held = np.array([[axis in self.anchors.get(node, "") for axis in "xyz"] for node in nodes])
         held[first_node[-1] :] = False
+        stiffness = np.array([self.springs.get(node, [0.0, 0.0, 0.0]) for node in nodes])
+        damping = np.array([self.dampers.get(node, [0.0, 0.0, 0.0]) for node in nodes])
         touching = nodes[: first_node[-1]] if self.contacts == "all" else self.contacts
         struts = sorted(members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
         makes = [self.struts[strut.group] for strut in struts]
@@ -325,8 +337,8 @@ class StructureFile(RobotSettings):
             **self._spheres(number, held),
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
-            anchor_stiffness=self.anchor_stiffness * held,
-            anchor_damping=self.anchor_stiffness * self.anchor_time_constant * held,
+            anchor_stiffness=self.anchor_stiffness * held + stiffness,
+            anchor_damping=self.anchor_stiffness * self.anchor_time_constant * held + damping,
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
             **cables,
@@ -499,7 +511,7 @@ class StructureFile(RobotSettings):
             if max(map(abs, place)) > LONGEST:
                 expected = f"expected coordinates of at most {LONGEST:g} m"
                 refuse(f"nodes.{node}", f"found {place}, {expected}")
-        blueprint = self.blueprint()
+        blueprint = self.model_copy(update={"springs": {}}).blueprint()  # which hold nothing fast
         self._check_joined(blueprint)
         blueprint.check()
         self._check_actuated(blueprint.cable_names)
@@ -533,7 +545,8 @@ class StructureFile(RobotSettings):
         moving = [(f"masses.{node}", node) for node in self.masses]
         for name, group in self.spheres.items():
             moving += [(f"spheres.{name}.nodes[{i}]", node) for i, node in enumerate(group.nodes)]
-        moving += [(f"loads.{node}", node) for node in self.loads]
+        for key in ("loads", "springs", "dampers"):
+            moving += [(f"{key}.{node}", node) for node in getattr(self, key)]
         if self.contacts != "all":
             moving += [(f"contacts[{i}]", node) for i, node in enumerate(self.contacts)]
         return moving
