@@ -347,7 +347,8 @@ class _MjcfTranslation:
         """Loads, springs and dampers of nodes, from free joints, compensated gravity and actuators
         at sites; and `anchors`, or anchors for springs of sites that are all alike."""
         model, gravity = self.model, np.array([0.0, 0.0, self._gravity()])
-        of_bodies, of_sites = (defaultdict(lambda: np.zeros((3, 3))) for _ in range(2))
+        of_bodies: defaultdict[str, np.ndarray] = defaultdict(lambda: np.zeros((3, 3)))
+        of_sites = of_bodies.copy()
         lifts = model.body_mass * model.body_gravcomp
         for body in np.flatnonzero(np.isin(self.roots, used)).tolist():
             stiffness, damping, armature = self.free[body]
@@ -416,9 +417,7 @@ class _MjcfTranslation:
             if tendon == _NODE:
                 continue
             if tendon not in cables or not self.is_linear[actuator]:
-                self._note(
-                    "actuators that drive no cable here, or its second ones", "actuator", actuator
-                )
+                self._note("actuators of no cable here, or its second ones", "actuator", actuator)
                 continue
             name = self._name("actuator", actuator).removesuffix(f" {self._name('tendon', tendon)}")
             key = keys.setdefault(name, _plain(name, actuated))
