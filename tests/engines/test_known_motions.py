@@ -321,7 +321,7 @@ def test_the_spin_of_a_bar_about_its_axis_hardly_shortens_steps():
 def test_a_node_with_a_damper_sinks_as_in_oil(engine):
     mass, damping = 0.2, 0.8
     tree = {"nodes": {"top": [0.0, 0.0, 1.0], "a": [0.0, 0.0, 0.5]}, "anchors": {"top": "xyz"}}
-    tree |= {"masses": {"a": mass}, "dampers": {"a": [0.0, 0.0, damping]}, "cables": {"line": LINE}}
+    tree |= {"masses": {"a": mass}, "dampers": {"a": damping}, "cables": {"line": LINE}}
     raised = scenario_of(tree, 0.2, **{"robot.offsets": [["0 m", "0 m", "0.3 m"]]})
     trajectory = trajectory_of(Robot.of(raised), engine)
     z = trajectory["p_WN"].sel(node="a", axis="z")

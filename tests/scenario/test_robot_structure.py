@@ -66,17 +66,16 @@ def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
 
 
 def test_springs_and_dampers_of_nodes_add_to_anchors() -> None:
-    springs = "springs: {a: [1 N/m, 2 N/m, 0 N/m], g: [0 N/m, 0 N/m, 5 N/m]}"
-    blueprint = structure(f"{{anchors: {{a: x}}, {springs}, dampers: {{g: [0, 0, 4 N*s/m]}}}}")
-    blueprint = blueprint.blueprint()
+    given = structure("{anchors: {a: x}, springs: {a: 2 N/m}, dampers: {g: 4 N*s/m}}")
+    blueprint = given.blueprint()
     a, g = blueprint.node_names.index("a"), blueprint.node_names.index("g")
-    assert blueprint.anchor_stiffness[[a, g]].tolist() == [[1e5 + 1, 2, 0], [0, 0, 5]]
-    assert blueprint.anchor_damping[[a, g]].tolist() == [[100, 0, 0], [0, 0, 4]]
+    assert blueprint.anchor_stiffness[[a, g]].tolist() == [[1e5 + 2, 2, 2], [0, 0, 0]]
+    assert blueprint.anchor_damping[[a, g]].tolist() == [[100, 0, 0], [4, 4, 4]]
     assert np.count_nonzero(blueprint.anchor_stiffness) == 3
 
 
 def test_a_robot_that_springs_hold_alone_moves() -> None:
-    every = ", ".join(f"{node}: [1 N/m, 1 N/m, 1 N/m]" for node in "abcdefg")
+    every = ", ".join(f"{node}: 1 N/m" for node in "abcdefg")
     assert structure(f"springs: {{{every}}}").blueprint().held.all()
 
 
@@ -122,9 +121,8 @@ TWO_FIXED = "nodes: {h: [1, 1, 1], i: [1, 1, 2]}\nanchors: {h: xyz, i: xyz}\n"
         ("{nodes: {h: [1, 1, 1]}, anchors: {h: xz}}", "nodes.h", ["no strut", "xyz"]),
         ("{nodes: {h: [1, 1, 1]}, loads: {h: [0 N, 0 N, 1 N]}}", "loads.h", ["unused"]),
         ("{nodes: {h: [1, 1, 1]}, masses: {h: 1 g}}", "nodes.h", ["no cable"]),
-        ("springs: {q: [0, 0, 1 N/m]}", "springs.q", ["unknown", "'q'"]),
-        ("dampers: {g: [0, 0, -1 N*s/m]}", "dampers.g[2]", ["-1"]),
-        ("dampers: {g: [0, 1 N*s/m]}", "dampers.g", ["3"]),
+        ("springs: {q: 1 N/m}", "springs.q", ["unknown", "'q'"]),
+        ("dampers: {g: -1 N*s/m}", "dampers.g", ["-1"]),
         ("struts: {bar: {density: 0}}", "nodes.f", ["0 kg"]),
         ("anchors: {a: xyz, b: yz, c: z, d: xyz, e: xy, f: xyz, g: xy}", "anchors", ["every body"]),
         (f"{TWO_FIXED}cables: {{long: {{pairs: [[h, i]]}}}}", "cables.long.pairs[0]", ["fixed"]),

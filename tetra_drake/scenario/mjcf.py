@@ -81,6 +81,19 @@ class _MjcfPart(NamedTuple):
     settings: Tree
 
 
+class _Push(NamedTuple):
+    """Force that an actuator exerts on a node from the world at control 0."""
+
+    actuator: int
+    node: str
+    load: np.ndarray
+    """Constant force (3,) in the world."""
+    axis: np.ndarray
+    """Direction (3,) of its spring and its damper."""
+    stiffness: float
+    damping: float
+
+
 class _MjcfTranslation:
     """Conversion of a compiled model to the content of a structure file."""
 
@@ -345,42 +358,39 @@ class _MjcfTranslation:
 
     def _held(self, used: list[int], anchors: Tree) -> Tree:
         """Loads, springs and dampers of nodes, from free joints, compensated gravity and actuators
-        at sites; and `anchors`, or anchors for springs of sites that are all alike."""
+        at sites; and `anchors`, or else anchors for springs of actuators that are all alike."""
         model, gravity = self.model, np.array([0.0, 0.0, self._gravity()])
-        of_bodies: defaultdict[str, np.ndarray] = defaultdict(lambda: np.zeros((3, 3)))
-        of_sites = of_bodies.copy()
+        loads: defaultdict[str, np.ndarray] = defaultdict(lambda: np.zeros(3))
+        tree: Tree = {"anchors": anchors, "springs": {}, "dampers": {}}
         lifts = model.body_mass * model.body_gravcomp
         for body in np.flatnonzero(np.isin(self.roots, used)).tolist():
-            stiffness, damping, armature = self.free[body]
-            own = np.stack([armature * gravity, np.full(3, stiffness), np.full(3, damping)])
-            lift = np.outer([lifts[body], 0.0, 0.0], gravity)
-            for place, law in [(self.data.xpos[body], own), (self.data.xipos[body], lift)]:
-                if law.any():
-                    name = self._name("body", body)
-                    of_bodies[self._node(int(self.roots[body]), place, name)] += law
-        for node, law in self._pushes(used):
-            of_sites[node] += law
-        tree: Tree = {"anchors": anchors}
-        alike = {spring for law in of_sites.values() for spring in zip(*law[1:], strict=True)}
-        stiffness, damping = max(alike, default=(0.0, 0.0))
-        if not anchors and stiffness and alike <= {(0.0, 0.0), (stiffness, damping)}:
-            tree["anchor_stiffness"] = _text(stiffness, "N/m")
-            tree["anchor_time_constant"] = _text(damping / stiffness, "s")
-            held = {node: law[1].copy() for node, law in of_sites.items() if law[1].any()}
-            tree["anchors"] = {n: "".join(itertools.compress("xyz", k)) for n, k in held.items()}
-            for law in of_sites.values():
-                law[1:] = 0.0
-        for node, law in of_sites.items():
-            of_bodies[node] += law
-        units = {"loads": "N", "springs": "N/m", "dampers": "N*s/m"}
-        for row, (key, unit) in enumerate(units.items()):
-            laws = {node: law[row].tolist() for node, law in of_bodies.items() if law[row].any()}
-            tree[key] = {node: [_text(x, unit) for x in law] for node, law in laws.items()}
-        return tree
+            root, name = int(self.roots[body]), self._name("body", body)
+            if lifts[body]:
+                loads[self._node(root, self.data.xipos[body], name)] += lifts[body] * gravity
+            if self.free[body].any():
+                node = self._node(root, self.data.xpos[body], name)
+                stiffness, damping, armature = self.free[body].tolist()
+                loads[node] += armature * gravity
+                tree["springs"] |= {node: _text(stiffness, "N/m")} if stiffness else {}
+                tree["dampers"] |= {node: _text(damping, "N*s/m")} if damping else {}
+        pushes = [*self._pushes(used)]
+        laws = {push[-2:] for push in pushes} - {(0.0, 0.0)}
+        is_anchored = len(laws) == 1 and not anchors and min(laws)[0] > 0.0
+        for actuator, node, load, axis, stiffness, damping in pushes:
+            if (stiffness or damping) and not is_anchored:
+                continue
+            self.driven[actuator] = _NODE
+            loads[node] += load
+            if stiffness:
+                tree["anchor_stiffness"] = _text(stiffness, "N/m")
+                tree["anchor_time_constant"] = _text(damping / stiffness, "s")
+                along = "xyz"[int(np.abs(axis).argmax())]
+                tree["anchors"] |= {node: "".join(sorted({*anchors.get(node, ""), along}))}
+        held = {node: load.tolist() for node, load in loads.items() if load.any()}
+        return tree | {"loads": {node: [_text(x, "N") for x in held[node]] for node in held}}
 
-    def _pushes(self, used: list[int]) -> Iterator[tuple[str, np.ndarray]]:
-        """Actuators that push a site along an axis of a site of the world: the pushed node, and its
-        load, stiffness and damping (3, 3)."""
+    def _pushes(self, used: list[int]) -> Iterator[_Push]:
+        """Actuators that push a site along an axis of a site of the world."""
         model, roots = self.model, self.roots[self.model.site_bodyid]
         places = self._places(model.site_bodyid, model.site_pos)
         is_on_site = model.actuator_trntype == self.mujoco.mjtTrn.mjTRN_SITE
@@ -392,12 +402,11 @@ class _MjcfTranslation:
             is_askew = gear[3:].any() or (any(law) and np.count_nonzero(axis) > 1)
             is_held = origin >= 0 and roots[origin] == _WORLD and roots[site] in used
             if is_held and not is_askew and max(law) <= 0.0:
-                self.driven[actuator] = _NODE
                 gap = axis @ (places[site] - places[origin])
-                if abs(gap) <= _LARGEST_GAP * self.near * np.abs(axis).max():
-                    gap = 0.0
-                load = axis * (push + law[0] * gap)
-                yield self.node_of[site], np.stack([load, *np.outer(law, -(axis**2))])
+                is_closed = abs(gap) <= _LARGEST_GAP * self.near * np.abs(axis).max()
+                load = push + law[0] * (0.0 if is_closed else gap)
+                stiffness, damping = (-axis @ axis * np.array(law)).tolist()
+                yield _Push(actuator, self.node_of[site], axis * load, axis, stiffness, damping)
 
     def _close(self, joints: Tree) -> None:
         """Moves the second node of each joint with a small gap to the first."""

@@ -14,7 +14,7 @@ import operator
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import pydantic
@@ -79,11 +79,9 @@ def _check_name(name: object) -> object:
 
 
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
-Number = TypeVar("Number")
 BareLength = Annotated[Length, Field(json_schema_extra={"if": False})]
 """A length that needs no unit where the structure has one."""
 Coordinates = Annotated[list[BareLength], Field(min_length=3, max_length=3)]
-PerAxis = Annotated[list[Annotated[Number, Field(ge=0)]], Field(min_length=3, max_length=3)]
 CablePath = Annotated[list[str], Field(min_length=2, max_length=MOST_NODES)]
 AnchorAxes = Annotated[
     Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
@@ -271,10 +269,14 @@ class StructureFile(RobotSettings):
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
-    springs: Keyed[str, PerAxis[Stiffness]] = Field(default={}, exclude_if=operator.not_)
-    """Stiffness [x, y, z] of springs between nodes of bodies and their places in the file."""
-    dampers: Keyed[str, PerAxis[Damping]] = Field(default={}, exclude_if=operator.not_)
-    """Damping [x, y, z] of nodes of bodies, such as of a float in water."""
+    springs: Keyed[str, Annotated[Stiffness, Field(gt=0)]] = Field(
+        default={}, exclude_if=operator.not_
+    )
+    """Stiffness, along all axes, of springs from nodes of bodies to their places in the file."""
+    dampers: Keyed[str, Annotated[Damping, Field(gt=0)]] = Field(
+        default={}, exclude_if=operator.not_
+    )
+    """Damping, along all axes, of nodes of bodies, such as of a float in oil."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
@@ -314,8 +316,9 @@ class StructureFile(RobotSettings):
         number = {node: index for index, node in enumerate(nodes)}
         held = np.array([[axis in self.anchors.get(node, "") for axis in "xyz"] for node in nodes])
         held[first_node[-1] :] = False
-        stiffness = np.array([self.springs.get(node, [0.0, 0.0, 0.0]) for node in nodes])
-        damping = np.array([self.dampers.get(node, [0.0, 0.0, 0.0]) for node in nodes])
+        stiffness, damping = (
+            np.array([[of.get(node, 0.0)] for node in nodes]) for of in (self.springs, self.dampers)
+        )
         touching = nodes[: first_node[-1]] if self.contacts == "all" else self.contacts
         struts = sorted(members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
         makes = [self.struts[strut.group] for strut in struts]
