@@ -239,6 +239,18 @@ def test_armature_is_mass_without_weight(tmp_path: Path) -> None:
     assert "ball" in str(structure.ignored), "of the torques"
 
 
+def test_free_joints_at_one_place_have_a_damper_each(tmp_path: Path) -> None:
+    rod = '<body name="{0}"><joint type="free" damping="2"/><geom type="capsule" size="0.01" '
+    rod += 'fromto="{1} 0 1 {1} 0 2"/><site name="s{0}" pos="{1} 0 1"/></body>'
+    path = '<site site="sa"/><site site="sb"/>'
+    text = f"<mujoco><worldbody>{rod.format('a', 1)}{rod.format('b', 2)}</worldbody><tendon>"
+    text += f'<spatial stiffness="9" springlength="0 1">{path}</spatial></tendon></mujoco>'
+    (tmp_path / "a.xml").write_text(text)
+    structure = read_structure(tmp_path / "a.xml")
+    assert [structure.nodes["a"], structure.dampers] == [structure.nodes["b"], {"a": 2, "b": 2}]
+    assert structure.blueprint().body_of_node == ("a", "a", "b", "b")
+
+
 def test_what_a_model_has_disabled_is_nothing(tmp_path: Path) -> None:
     joint = FREE.format('stiffness="30" damping="3" frictionloss="1"')
     off = '<flag damper="disable" frictionloss="disable" gravity="disable"/>'
@@ -297,6 +309,9 @@ def test_a_body_is_left_out_by_name(tmp_path: Path, refused) -> None:
     assert [*structure.nodes] == ["top", "side", "eye"]
     assert "ghost, aim" in str(structure.ignored)
     scenario.write_text(robot.format("ball.xml", "ghots"))
+    with refused(file, "without", "'ghost'"):
+        load_scenario(scenario)
+    scenario.write_text(robot.format("ball.xml", "ghost, ghost"))
     with refused(file, "without", "'ghost'"):
         load_scenario(scenario)
     for name, without in (("prism", "ghost"), ("ball.xml", "3")):

@@ -88,10 +88,10 @@ class _Push(NamedTuple):
     node: str
     load: np.ndarray
     """Constant force (3,) in the world."""
-    axis: np.ndarray
-    """Direction (3,) of its spring and its damper."""
-    stiffness: float
-    damping: float
+    axis: str
+    """Axis of its spring and its damper, such as x."""
+    law: tuple[float, float]
+    """Stiffness and damping."""
 
 
 class _MjcfTranslation:
@@ -374,18 +374,18 @@ class _MjcfTranslation:
                 tree["springs"] |= {node: _text(stiffness, "N/m")} if stiffness else {}
                 tree["dampers"] |= {node: _text(damping, "N*s/m")} if damping else {}
         pushes = [*self._pushes(used)]
-        laws = {push[-2:] for push in pushes} - {(0.0, 0.0)}
-        is_anchored = len(laws) == 1 and not anchors and min(laws)[0] > 0.0
-        for actuator, node, load, axis, stiffness, damping in pushes:
-            if (stiffness or damping) and not is_anchored:
+        laws = [push.law for push in pushes if any(push.law)]
+        axes = {(push.node, push.axis) for push in pushes if any(push.law)}
+        are_alike = len({*laws}) == 1 and laws[0][0] > 0.0 and len(axes) == len(laws)
+        for actuator, node, load, axis, (stiffness, damping) in pushes:
+            if (stiffness or damping) and (anchors or not are_alike):
                 continue
             self.driven[actuator] = _NODE
             loads[node] += load
             if stiffness:
                 tree["anchor_stiffness"] = _text(stiffness, "N/m")
                 tree["anchor_time_constant"] = _text(damping / stiffness, "s")
-                along = "xyz"[int(np.abs(axis).argmax())]
-                tree["anchors"] |= {node: "".join(sorted({*anchors.get(node, ""), along}))}
+                tree["anchors"] = {**tree["anchors"], node: tree["anchors"].get(node, "") + axis}
         held = {node: load.tolist() for node, load in loads.items() if load.any()}
         return tree | {"loads": {node: [_text(x, "N") for x in held[node]] for node in held}}
 
@@ -405,8 +405,9 @@ class _MjcfTranslation:
                 gap = axis @ (places[site] - places[origin])
                 is_closed = abs(gap) <= _LARGEST_GAP * self.near * np.abs(axis).max()
                 load = push + law[0] * (0.0 if is_closed else gap)
-                stiffness, damping = (-axis @ axis * np.array(law)).tolist()
-                yield _Push(actuator, self.node_of[site], axis * load, axis, stiffness, damping)
+                stiffness, damping = (-(axis @ axis) * np.array(law)).tolist()
+                along = "xyz"[int(np.abs(axis).argmax())]
+                yield _Push(actuator, self.node_of[site], axis * load, along, (stiffness, damping))
 
     def _close(self, joints: Tree) -> None:
         """Moves the second node of each joint with a small gap to the first."""
@@ -450,12 +451,10 @@ class _MjcfTranslation:
         yield "joints that are not free, read as rigid", "joint", ~is_free
         what = "torques of the stiffness and damping of free joints, left out"
         yield what, "body", self.free[:, :2].any(axis=1)
-        for name, values in (
-            ("frictionloss", model.dof_frictionloss[first]),
-            ("stiffnesspoly", model.jnt_stiffnesspoly.any(axis=1)),
-            ("dampingpoly", model.dof_dampingpoly[first].any(axis=1)),
-        ):
-            yield f"the setting '{name}' of free joints, left out", "joint", is_free * values
+        others = [model.dof_frictionloss[first, np.newaxis], model.dof_dampingpoly[first]]
+        has_others = np.hstack([*others, model.jnt_stiffnesspoly]).any(axis=1)
+        what = "frictionloss of free joints and what is not linear in them, left out"
+        yield what, "joint", is_free & has_others
         kinds = [mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD]
         is_known = np.isin(model.eq_type, kinds) & model.eq_active0.astype(bool)
         yield "other equality constraints, left out", "equality", ~is_known

@@ -52,11 +52,11 @@ def compiled_model(file: Path, *, without: Collection[str] = ()) -> tuple[Any, l
             return mujoco.MjModel.from_xml_path(str(file)), left_out
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
         spec.modelfiledir = os.path.abspath(file.parent)
-        bodies = {body.name: body for body in spec.bodies[1:]}
-        if unknown := [name for name in without if name not in bodies]:
-            problem = f"found no body '{unknown[0]}' to leave out; {hint(unknown[0], bodies)}"
-            raise InputError(file, "without", problem)
         for name in without:
+            bodies = {body.name: body for body in spec.bodies[1:]}  # without those in deleted ones
+            if name not in bodies:
+                problem = f"found no body '{name}' to leave out; {hint(name, bodies)}"
+                raise InputError(file, "without", problem)
             spec.delete(bodies[name])
         return spec.compile(), left_out
     except InputError:

@@ -92,7 +92,7 @@ def with_structure(tree: Tree, source: object) -> Tree:
         raise InputError(source, "robot.file", f"{described(name)}: {problem}")
     file = structure_file(name, Path())
     if isinstance(without := robot.get("without"), str) and is_mjcf(file):
-        content = mjcf_tree(file, without=without.split(", "))
+        content = mjcf_tree(file, without=[name.strip() for name in without.split(",")])
     elif without is not None:
         problem = f"found {described(without)}, expected bodies of a file of MuJoCo, such as a, b"
         raise InputError(source, "robot.without", problem)
