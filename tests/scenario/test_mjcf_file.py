@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.anchored import supported_prism
 from pytest import approx
 
 from tetra_drake.cli import main
 from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.shipped import shipped_structures
 from tetra_drake.scenario.structure_files import read_structure, save_structure
 from tetra_drake.study.equilibrium import robot_of_file
@@ -62,11 +64,57 @@ OTHERS = """<mujoco><option gravity="1 0 -5"/><worldbody>
 </actuator></mujoco>"""
 
 
+LOOSE = OTHERS.replace("stiffness", "damping").replace("biasprm", "user")
+LOOSE = LOOSE.replace('limited="true" range="0 9"', "")
+ATTACHES = """<mujoco><asset><model name="x" file="{}"/></asset>
+  <worldbody><attach model="x" prefix="p"/></worldbody></mujoco>"""
+
+
 # A ball on a tether, with settings, and with the places of its sphere and of its node.
 TETHERED = """<mujoco>{}<worldbody><site name="o"/><body pos="0 0 1"><freejoint/>
   <geom size="0.1" {}/><site name="a" pos="{}"/></body></worldbody><tendon>
   <spatial stiffness="9" springlength="0 1"><site site="o"/><site site="a"/></spatial></tendon>
 </mujoco>"""
+
+
+# A ball on a rope and on a guy, with an option, a joint, attributes of the rope, and more.
+BALL = """<mujoco><option timestep="0.001">{option}</option><worldbody>
+  <site name="top" pos="0 0 2"/><site name="side" pos="0.8 0.1 1.4"/>
+  <body name="ball" pos="0 0 1.2" {body}>{joint}
+    <geom size="0.05" mass="1"/><site name="eye"/></body>
+</worldbody><tendon>
+  <spatial name="rope" {rope}><site site="top"/><site site="eye"/></spatial>
+  <spatial stiffness="60" springlength="0 0.5"><site site="side"/><site site="eye"/></spatial>
+</tendon>{more}</mujoco>"""
+SPRING = 'stiffness="100" springlength="0 0.6" damping="2"'
+FREE = '<joint name="root" type="free" {}/>'
+
+
+def ball(tmp_path: Path, **parts: str) -> Path:
+    """File with the ball, and parts of it."""
+    given = dict(option="", body="", joint="<freejoint/>", rope=SPRING, more="") | parts
+    (tmp_path / "ball.xml").write_text(BALL.format(**given))
+    return tmp_path / "ball.xml"
+
+
+def on_rope(actuator: str) -> str:
+    return f'<actuator><{actuator} name="pull" tendon="rope"/></actuator>'
+
+
+def left_at_rest(file: Path) -> np.ndarray:
+    """Acceleration in MuJoCo at control 0 of the ball where the structure has it at rest. At rest,
+    activations have reached their ends."""
+    structure = robot_of_file(str(file)).structure
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    bounds = (
+        model.actuator_actrange if model.actuator_actlimited.any() else model.actuator_ctrlrange
+    )
+    data.act[:] = np.clip(0.0, *bounds.T)[: model.na]
+    eye = structure.node_names.index("eye")
+    data.qpos[:3] = structure.p_WB[0] + structure.p_BN[eye]
+    mujoco.mj_forward(model, data)
+    return data.qacc[:3]
 
 
 def model_of(robot: Robot) -> Any:
@@ -146,6 +194,132 @@ def test_what_a_file_of_others_says(tmp_path: Path) -> None:
     assert "t2" not in told
 
 
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"joint": FREE.format('stiffness="30" damping="3"')},
+        {"joint": FREE.format('stiffness="30" armature="0.5"')},
+        {"body": 'gravcomp="0.4"'},
+        {"body": 'gravcomp="0.4"', "joint": FREE.format('actuatorgravcomp="true"')},
+        {"rope": "", "more": on_rope('position kp="500" ctrlrange="0.5 0.9"')},
+        {"rope": "", "more": on_rope('position kp="500" ctrlrange="0.5 0.9" timeconst="0.1"')},
+        {"rope": "", "more": on_rope('intvelocity kp="500" ctrlrange="-1 1" actrange="0.5 0.9"')},
+        {"more": on_rope('motor ctrlrange="-9 -3" gear="2"')},
+        {"more": on_rope('motor forcerange="-9 -3" gear="2"')},
+        {
+            "rope": "",
+            "more": on_rope('general gaintype="affine" gainprm="1 -9 -1" ctrlrange="2 3"'),
+        },
+        {
+            "option": '<flag spring="disable"/>',
+            "more": on_rope('position kp="80" ctrlrange="0.5 0.9"'),
+        },
+        {
+            "option": '<flag actuation="disable"/>',
+            "more": on_rope('position kp="80" ctrlrange="0.5 0.9"'),
+        },
+        {"option": '<flag limit="disable"/>', "rope": f'{SPRING} range="0 0.5"'},
+        {
+            "more": '<actuator><motor site="eye" refsite="side" gear="1 2 3 0 0 0" '
+            'ctrlrange="1 3"/><general site="eye" refsite="top" gear="0 0 1 0 0 0" '
+            'biastype="affine" biasprm="1 -40 -2"/></actuator>'
+        },
+    ],
+)
+def test_a_robot_rests_where_it_rests_in_mujoco_at_control_0(parts, tmp_path: Path) -> None:
+    assert left_at_rest(ball(tmp_path, **parts)) == approx([0.0, 0.0, 0.0], abs=1e-4)
+
+
+def test_armature_is_mass_without_weight(tmp_path: Path) -> None:
+    structure = read_structure(ball(tmp_path, joint=FREE.format('armature="0.5" damping="3"')))
+    body, own = structure.bodies["ball"], 0.4 * 0.05**2  # of a sphere
+    assert [body.mass, body.inertia] == [approx(1.5), approx([own + 0.5] * 3 + [0] * 3)]
+    assert structure.loads == {"eye": approx([0, 0, 0.5 * 9.81])}
+    assert [structure.springs, structure.dampers] == [{}, {"eye": 3}]
+    assert "ball" in str(structure.ignored), "of the torques"
+
+
+def test_free_joints_at_one_place_have_a_damper_each(tmp_path: Path) -> None:
+    rod = '<body name="{0}"><joint type="free" damping="2"/><geom type="capsule" size="0.01" '
+    rod += 'fromto="{1} 0 1 {1} 0 2"/><site name="s{0}" pos="{1} 0 1"/></body>'
+    path = '<site site="sa"/><site site="sb"/>'
+    text = f"<mujoco><worldbody>{rod.format('a', 1)}{rod.format('b', 2)}</worldbody><tendon>"
+    text += f'<spatial stiffness="9" springlength="0 1">{path}</spatial></tendon></mujoco>'
+    (tmp_path / "a.xml").write_text(text)
+    structure = read_structure(tmp_path / "a.xml")
+    assert [structure.nodes["a"], structure.dampers] == [structure.nodes["b"], {"a": 2, "b": 2}]
+    assert structure.blueprint().body_of_node == ("a", "a", "b", "b")
+
+
+def test_what_a_model_has_disabled_is_nothing(tmp_path: Path) -> None:
+    joint = FREE.format('stiffness="30" damping="3" frictionloss="1"')
+    off = '<flag damper="disable" frictionloss="disable" gravity="disable"/>'
+    file = ball(tmp_path, joint=joint, option=off, rope=f'{SPRING} range="0 0.4"')
+    structure = read_structure(file)
+    assert [structure.gravity, structure.dampers] == [0.0, {}]
+    assert {cables.damping for cables in structure.cables.values()} == {0.0}
+    told = str(structure.ignored)
+    assert "'limited' of tendons, left out: rope" in told
+    assert "frictionloss" not in told
+    for flag in ("limit", "constraint"):
+        file.write_text(file.read_text().replace("gravity=", f'{flag}="disable" gravity='))
+        assert "limited" not in str(read_structure(file).ignored)
+
+
+def test_a_limited_tendon_is_a_stiff_cable(tmp_path: Path) -> None:
+    limit = 'range="0.1 0.75" margin="0.02" solreflimit="0.004 1"'
+    file = ball(tmp_path, rope=limit)
+    robot, model = robot_of_file(str(file)), mujoco.MjModel.from_xml_path(str(file))
+    assert robot.structure.cables["free_length"][0] == approx(0.73)
+    model.dof_damping[:3] = 5.0
+    data = mujoco.MjData(model)
+    while data.time < 4.0:
+        mujoco.mj_step(model, data)
+    eye = robot.structure.p_WB[0] + robot.structure.p_BN[robot.structure.node_names.index("eye")]
+    assert eye == approx(data.site("eye").xpos, abs=1e-4)
+    assert [line for line in robot.scenario.robot.ignored if "lower limits" in line]
+
+
+def test_anchors_and_loads_come_back(tmp_path: Path) -> None:
+    changes = {"friction.stiffness": "0 N/m", "engine": "!Mujoco"}
+    scenario = supported_prism(**changes)
+    (tmp_path / "a.xml").write_text(make_mjcf(Robot.of(scenario, at_rest=True)))
+    structure, given = read_structure(tmp_path / "a.xml"), scenario.robot
+    assert [structure.anchors, structure.loads] == [given.anchors, given.loads]
+    held = [structure.anchor_stiffness, structure.anchor_time_constant]
+    assert held == approx([given.anchor_stiffness, given.anchor_time_constant])
+    assert [structure.springs, structure.dampers, structure.ignored] == [{}, {}, None]
+
+
+GHOST = """<body name="ghost" pos="0 0 1"><freejoint/><geom size="0.01" mass="1e-9"/>
+  <site name="g"/></body><body name="aim" mocap="true" pos="0 0 1"/>"""
+REFERS = """<equality><weld body1="ghost" body2="aim"/></equality><sensor><framepos
+  objtype="body" objname="ghost"/></sensor><keyframe><key time="1"/></keyframe>"""
+LEASH = '<spatial stiffness="1"><site site="g"/><site site="eye"/></spatial></tendon>'
+
+
+def test_a_body_is_left_out_by_name(tmp_path: Path, refused) -> None:
+    file, scenario = ball(tmp_path, more=REFERS), tmp_path / "my.yaml"
+    text = file.read_text().replace("</worldbody>", f"{GHOST}</worldbody>")
+    file.write_text(text.replace("</tendon>", LEASH))
+    assert "g" in read_structure(file).nodes
+    robot = "base: prism\nname: my\nrobot: !Structure\n  file: {}\n  without: {}\n"
+    scenario.write_text(robot.format("ball.xml", "ghost, aim"))
+    structure = load_scenario(scenario).robot
+    assert [*structure.nodes] == ["top", "side", "eye"]
+    assert "ghost, aim" in str(structure.ignored)
+    scenario.write_text(robot.format("ball.xml", "ghots"))
+    with refused(file, "without", "'ghost'"):
+        load_scenario(scenario)
+    scenario.write_text(robot.format("ball.xml", "ghost, ghost"))
+    with refused(file, "without", "'ghost'"):
+        load_scenario(scenario)
+    for name, without in (("prism", "ghost"), ("ball.xml", "3")):
+        scenario.write_text(robot.format(name, without))
+        with refused(scenario, "robot.without"):
+            load_scenario(scenario)
+
+
 def test_a_file_of_an_earlier_mujoco_means_the_same(tmp_path: Path) -> None:
     settings = '<compiler coordinate="global"/><option><flag sensornoise="disable"/></option>'
     old = TETHERED.format(settings, 'pos="0 0 1"', "0.1 0 1")
@@ -182,7 +356,15 @@ def test_without_mujoco_the_error_says_how_to_install_it(monkeypatch, tmp_path, 
         ("<foo/>", "", "mujoco refuses the file"),
         ("<mujoco><nix/></mujoco>", "", "mujoco refuses the file"),
         ("<mujoco/>", "tendon", "no spatial tendon"),
-        (OTHERS.replace("stiffness", "damping").replace("biasprm", "user"), "tendon", "no spatial"),
+        (LOOSE, "tendon", "without stiffness or limit, left out: t1, t2, t4"),
+        (LOOSE.replace("t4", "t4" * 99), "tendon", "to itself, left out: t3"),
+        (f"<mujoco><worldbody><body><{'nix' * 99}/></body></worldbody></mujoco>", "", "line 1"),
+        (
+            '<mujoco><asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
+            "",
+            "",
+        ),
+        (ATTACHES.format("a.xml"), "include", "twice"),
     ],
 )
 def test_other_files_are_refused_in_one_line(text, key, fact, tmp_path, refused) -> None:

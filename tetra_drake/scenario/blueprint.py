@@ -109,7 +109,7 @@ class Blueprint:
     """Stiffness (nodes, 3) of the springs that hold the nodes of bodies along x, y and z; 0 along a
     free axis."""
     anchor_damping: np.ndarray
-    """Damping (nodes, 3) of the springs that hold the nodes of bodies along x, y and z."""
+    """Damping (nodes, 3) of the nodes of bodies along x, y and z."""
     payload: np.ndarray
     """Point masses at the centres of mass of the bodies (bodies,)."""
     offsets: np.ndarray
@@ -357,11 +357,14 @@ class Blueprint:
             refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
 
     def _check_places(self) -> None:
-        """Raises InputError for two nodes at the same position."""
+        """Raises InputError for two nodes at the same position, unless nothing leads to one of
+        them."""
         p_WN, least = self.p_WN, LEAST_DISTANCE * self.shortest
-        for node in range(1, len(p_WN)):
+        is_end = np.isin(np.arange(len(p_WN)), [*self.segments.ends.flat, *self.struts.flat])
+        for node in np.flatnonzero(is_end)[1:].tolist():
             distances = np.linalg.norm(p_WN[:node] - p_WN[node], axis=1)
             distances[self.places[:node] == self.places[node]] = np.inf
+            distances[~is_end[:node]] = np.inf
             if distances.min() < least:
                 problem = f"found the place of '{self.node_names[distances.argmin()]}'"
                 expected = f"expected nodes {least:.3g} m apart"

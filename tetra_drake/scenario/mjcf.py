@@ -6,7 +6,8 @@ centre and inertia. Its sites are nodes. A capsule or a cylinder between two nod
 of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0. Nodes where
 spheres and capsules touch a level plane are feet, and the plane becomes the ground at z = 0. A free
 robot that is lower is raised to it.
-Actuators of tendons become oscillators. The spring of a position actuator belongs to its cable.
+Actuators of tendons become oscillators. What an actuator exerts at control 0 belongs to its cable,
+or to its site. A limit of a tendon is a stiff cable. Free joints may have springs and dampers.
 
 Tendons of MuJoCo push below their spring length, and their dampers also act where a cable is slack.
 Cables do neither. A scenario has its own friction, ground and solver. Cameras, lights, materials
@@ -18,7 +19,8 @@ from __future__ import annotations
 import itertools
 import logging
 import re
-from collections import Counter
+import textwrap
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,6 +30,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.blueprint import TOLERANCE
 from tetra_drake.scenario.mjcf_file import compiled_model
+from tetra_drake.scenario.mjcf_forces import actuator_laws, limit_laws, obey_flags, tendon_laws
 from tetra_drake.scenario.robot_structure import MOST_NODES
 from tetra_drake.scenario.structure_graph import unused_name
 from tetra_drake.settings.section import Tree
@@ -37,29 +40,33 @@ SAME_HEIGHT = 1e-6
 _LARGEST_GAP = 1000.0
 """Largest gap of a joint that is closed, as a multiple of the distance that makes two nodes one."""
 _WORLD = 0
+_NODE = -2
 
 _LOG = logging.getLogger("tetra_drake")
 
 
-def mjcf_tree(file: Path) -> Tree:
-    """Converts an MJCF file to the content of a structure file.
+def mjcf_tree(file: Path, *, without: Collection[str] = ()) -> Tree:
+    """Converts an MJCF file to the content of a structure file, `without` bodies of these names.
 
     The log names what is left out, and the key `ignored` lists it. Names that structure files
     refuse are changed: "_" takes the place of blanks, dots, commas and brackets. Raises InputError
     that names the file.
     """
-    model, removed = compiled_model(file)
+    model, removed = compiled_model(file, without=without)
     if model.nsite > MOST_NODES:
         problem = f"found {model.nsite} sites, expected at most {MOST_NODES}"
         raise InputError(file, "worldbody", problem)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
         made = _MjcfTranslation(model)
         tree = made.tree()
-    notes = {"settings of earlier versions of MuJoCo": removed, **made.notes}
+    notes = {"settings of earlier versions of MuJoCo": removed, "bodies, left out": without}
+    notes |= made.notes
     tree["ignored"] = [f"{what}: {', '.join(names)}" for what, names in notes.items() if names]
     if not tree["cables"]:
         problem = "has no spatial tendon that can be a cable, expected one"
-        raise InputError(file, "tendon", "; ".join([problem, *tree["ignored"]]))
+        reasons = [line for line in tree["ignored"] if line.startswith("tendons")]
+        short = [textwrap.shorten(line, 60, placeholder=" ...") for line in reasons]
+        raise InputError(file, "tendon", "; ".join([problem, *short]))
     for line in tree["ignored"]:
         _LOG.warning("%s: %s", file, line)
     return {key: part for key, part in tree.items() if part}
@@ -74,12 +81,26 @@ class _MjcfPart(NamedTuple):
     settings: Tree
 
 
+class _Push(NamedTuple):
+    """Force that an actuator exerts on a node from the world at control 0."""
+
+    actuator: int
+    node: str
+    load: np.ndarray
+    """Constant force (3,) in the world."""
+    axis: str
+    """Axis of its spring and its damper, such as x."""
+    law: tuple[float, float]
+    """Stiffness and damping."""
+
+
 class _MjcfTranslation:
     """Conversion of a compiled model to the content of a structure file."""
 
     def __init__(self, model: Any) -> None:
         import mujoco
 
+        obey_flags(model)
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
         mujoco.mj_kinematics(model, self.data)
         self.nodes: dict[str, np.ndarray] = {}
@@ -90,11 +111,9 @@ class _MjcfTranslation:
         """Names of elements that are changed or left out, by what is told of them."""
         is_on_tendon = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
         self.driven = np.where(is_on_tendon, model.actuator_trnid[:, 0], -1)
-        """Tendon that each actuator drives (actuators,); -1 for an actuator of something else."""
-        biases = [mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE]
-        has_fixed_gain = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
-        self.is_linear = has_fixed_gain & np.isin(model.actuator_biastype, biases)
-        """True for actuators that are forces or linear springs; False for muscles."""
+        """Tendon that each actuator drives (actuators,); _NODE if it pushes a node, -1 for an
+        actuator of something else."""
+        self.is_linear, self.control, self.pushes = actuator_laws(model)
         size = np.ptp(np.vstack([self.data.site_xpos, self.data.xpos]), axis=0)
         self.near = TOLERANCE * float(np.linalg.norm(size))
         """Distance up to which two points are one node."""
@@ -105,8 +124,16 @@ class _MjcfTranslation:
         for eq in self._equalities(mujoco.mjtEq.mjEQ_WELD):
             first, second = sorted(root for root, _ in self._ends_of(eq))
             self.roots[self.roots == second] = first
-        self.laws = self._laws()
-        """Stiffness, damping and free length of each tendon (tendons, 3)."""
+        self.laws = tendon_laws(model, self.driven)
+        """Stiffness, damping and free length of each tendon, or of its limit (tendons, 3)."""
+        self.is_string = model.tendon_limited & (self.laws[:, 0] <= 0.0)
+        self.laws[self.is_string] = limit_laws(model)[self.is_string]
+        self.free = np.zeros((model.nbody, 3))
+        """Stiffness, damping and armature of the free joint of each body (bodies, 3)."""
+        free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+        first = model.jnt_dofadr[free]
+        laws = [model.jnt_stiffness[free], model.dof_damping[first], model.dof_armature[first]]
+        self.free[model.jnt_bodyid[free]] = np.transpose(laws)
         for what, kind, is_changed in self._changes():
             for number in np.flatnonzero(is_changed).tolist():
                 self._note(what, kind, number)
@@ -130,7 +157,12 @@ class _MjcfTranslation:
         level, is_touching = self._floor()
         ground = 0.0 if level is None or abs(level) < SAME_HEIGHT else level
         rods, feet = self._rods_and_feet(used, is_touching, (level or 0.0) - ground)
-        if level is None or not self._nodes_of(_WORLD):  # a free robot may stand in the soft floor
+        touching = [*feet] or self._nodes_of(*used)
+        if level is not None and not feet:
+            self.notes["floors that nothing touches in MuJoCo, but every node here"] = ["1"]
+        held = self._held(used, anchors)
+        is_held = self._nodes_of(_WORLD) or held["anchors"] or held["springs"]
+        if level is None or not is_held:  # a free robot may stand in the soft floor
             lows = [place[2] - feet.get(name, 0.0) for name, place in self.nodes.items()]
             ground = min([ground, *lows])
         spheres = [  # a foot of radius 0 has none
@@ -138,6 +170,8 @@ class _MjcfTranslation:
             for node, radius in feet.items()
             if radius > 0.0
         ]
+        for _, (node,), settings in spheres:  # the default is 0 where an anchor holds the node
+            settings["contact_radius"] = _text(feet[node], "m")
         struts, strut_names = _grouped(rods, "pairs")
         cables, cable_names = _grouped(itertools.starmap(self._cable, paths.items()), "pairs")
         self._close(joints)
@@ -148,9 +182,10 @@ class _MjcfTranslation:
             "spheres": _grouped(spheres, "nodes")[0],
             "bodies": self._bodies(used, dict(zip(strut_names, rods, strict=True)), ground),
             "joints": joints,
-            "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | anchors,
+            **held,
+            "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | held["anchors"],
             "actuated": self._actuated(dict(zip(paths, cable_names, strict=True))),
-            "contacts": [] if feet.keys() == {*self._nodes_of(*used)} else [*feet],
+            "contacts": [] if {*touching} == {*self._nodes_of(*used)} else touching,
             "gravity": _text(self._gravity(), "m/s^2"),
         }
 
@@ -210,27 +245,12 @@ class _MjcfTranslation:
             elif len({*self.roots[model.site_bodyid[sites]].tolist()}) == 1:
                 self._note("tendons that join a body to itself, left out", "tendon", tendon)
             elif self.laws[tendon, 0] <= 0.0:
-                self._note("tendons without stiffness, left out", "tendon", tendon)
+                self._note("tendons without stiffness or limit, left out", "tendon", tendon)
             else:
                 if len(sites) < len(kinds):
                     what = "tendons around surfaces, read as straight between sites"
                     self._note(what, "tendon", tendon)
                 yield tendon, sites
-
-    def _laws(self) -> np.ndarray:
-        """Stiffness, damping and free length of each tendon (tendons, 3), with the springs and
-        dampers of its actuators."""
-        model = self.model
-        stiffness, damping = model.tendon_stiffness.copy(), model.tendon_damping.copy()
-        force = stiffness * model.tendon_lengthspring[:, 1]
-        springs = self.is_linear & (self.driven >= 0)
-        tendons, gear = self.driven[springs], model.actuator_gear[springs, 0]
-        push, per_length, per_rate = model.actuator_biasprm[springs, :3].T
-        np.subtract.at(stiffness, tendons, gear**2 * per_length)
-        np.subtract.at(damping, tendons, gear**2 * per_rate)
-        np.add.at(force, tendons, gear * push)
-        free_length = np.divide(force, stiffness, out=0.0 * force, where=stiffness != 0.0)
-        return np.stack([stiffness, damping, free_length], axis=1)
 
     def _cable(self, tendon: int, sites: list[int]) -> _MjcfPart:
         """Cable of a tendon over sites."""
@@ -298,14 +318,16 @@ class _MjcfTranslation:
         bodies: Tree = {}
         for root in used:
             parts = np.flatnonzero(self.roots == root)
-            mass = model.body_mass[parts]
-            centres = self._places(parts, model.body_ipos[parts])
+            armature = self.free[parts, 2]  # acts like a sphere of this mass and moment of inertia
+            mass = np.append(model.body_mass[parts], armature)
+            centres = np.vstack([self._places(parts, model.body_ipos[parts]), data.xpos[parts]])
             centre = mass @ centres / mass.sum()
-            inertia = np.zeros((3, 3))
-            for part, arm in zip(parts, centres - centre, strict=True):
+            inertia = armature.sum() * np.eye(3)
+            for part in parts:
                 axes = data.ximat[part].reshape(3, 3)
                 inertia += axes * model.body_inertia[part] @ axes.T
-                inertia += model.body_mass[part] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+            for own, arm in zip(mass, centres - centre, strict=True):
+                inertia += own * (arm @ arm * np.eye(3) - np.outer(arm, arm))
             moments = np.append(inertia.diagonal(), inertia[[0, 0, 1], [1, 2, 2]])
             moments[np.abs(moments) < TOLERANCE**2 * moments.max()] = 0.0
             nodes = self._nodes_of(root)
@@ -334,6 +356,59 @@ class _MjcfTranslation:
                 joints[name] = {"nodes": nodes}
         return joints, anchors
 
+    def _held(self, used: list[int], anchors: Tree) -> Tree:
+        """Loads, springs and dampers of nodes, from free joints, compensated gravity and actuators
+        at sites; and `anchors`, or else anchors for springs of actuators that are all alike."""
+        model, gravity = self.model, np.array([0.0, 0.0, self._gravity()])
+        loads: defaultdict[str, np.ndarray] = defaultdict(lambda: np.zeros(3))
+        tree: Tree = {"anchors": anchors, "springs": {}, "dampers": {}}
+        lifts = model.body_mass * model.body_gravcomp
+        for body in np.flatnonzero(np.isin(self.roots, used)).tolist():
+            root, name = int(self.roots[body]), self._name("body", body)
+            if lifts[body]:
+                loads[self._node(root, self.data.xipos[body], name)] += lifts[body] * gravity
+            if self.free[body].any():
+                node = self._node(root, self.data.xpos[body], name)
+                stiffness, damping, armature = self.free[body].tolist()
+                loads[node] += armature * gravity
+                tree["springs"] |= {node: _text(stiffness, "N/m")} if stiffness else {}
+                tree["dampers"] |= {node: _text(damping, "N*s/m")} if damping else {}
+        pushes = [*self._pushes(used)]
+        laws = [push.law for push in pushes if any(push.law)]
+        axes = {(push.node, push.axis) for push in pushes if any(push.law)}
+        are_alike = len({*laws}) == 1 and laws[0][0] > 0.0 and len(axes) == len(laws)
+        for actuator, node, load, axis, (stiffness, damping) in pushes:
+            if (stiffness or damping) and (anchors or not are_alike):
+                continue
+            self.driven[actuator] = _NODE
+            loads[node] += load
+            if stiffness:
+                tree["anchor_stiffness"] = _text(stiffness, "N/m")
+                tree["anchor_time_constant"] = _text(damping / stiffness, "s")
+                tree["anchors"] = {**tree["anchors"], node: tree["anchors"].get(node, "") + axis}
+        held = {node: load.tolist() for node, load in loads.items() if load.any()}
+        return tree | {"loads": {node: [_text(x, "N") for x in held[node]] for node in held}}
+
+    def _pushes(self, used: list[int]) -> Iterator[_Push]:
+        """Actuators that push a site along an axis of a site of the world."""
+        model, roots = self.model, self.roots[self.model.site_bodyid]
+        places = self._places(model.site_bodyid, model.site_pos)
+        is_on_site = model.actuator_trntype == self.mujoco.mjtTrn.mjTRN_SITE
+        for actuator in np.flatnonzero(self.is_linear & is_on_site).tolist():
+            (site, origin), (push, *law) = model.actuator_trnid[actuator], self.pushes[actuator]
+            gear = model.actuator_gear[model.actuator_outadr[actuator]]
+            axis = self.data.site_xmat[origin].reshape(3, 3) @ gear[:3]
+            axis[np.abs(axis) <= TOLERANCE * np.abs(axis).max()] = 0.0
+            is_askew = gear[3:].any() or (any(law) and np.count_nonzero(axis) > 1)
+            is_held = origin >= 0 and roots[origin] == _WORLD and roots[site] in used
+            if is_held and not is_askew and max(law) <= 0.0:
+                gap = axis @ (places[site] - places[origin])
+                is_closed = abs(gap) <= _LARGEST_GAP * self.near * np.abs(axis).max()
+                load = push + law[0] * (0.0 if is_closed else gap)
+                stiffness, damping = (-(axis @ axis) * np.array(law)).tolist()
+                along = "xyz"[int(np.abs(axis).argmax())]
+                yield _Push(actuator, self.node_of[site], axis * load, along, (stiffness, damping))
+
     def _close(self, joints: Tree) -> None:
         """Moves the second node of each joint with a small gap to the first."""
         for name, joint in joints.items():
@@ -349,8 +424,10 @@ class _MjcfTranslation:
         actuated: Tree = {}
         keys: dict[str, str] = {}
         for actuator, tendon in enumerate(self.driven.tolist()):
+            if tendon == _NODE:
+                continue
             if tendon not in cables or not self.is_linear[actuator]:
-                self._note("actuators of no cable, or its second ones", "actuator", actuator)
+                self._note("actuators of no cable here, or its second ones", "actuator", actuator)
                 continue
             name = self._name("actuator", actuator).removesuffix(f" {self._name('tendon', tendon)}")
             key = keys.setdefault(name, _plain(name, actuated))
@@ -360,8 +437,7 @@ class _MjcfTranslation:
     def _gravity(self) -> float:
         """Acceleration of gravity along -z."""
         option = self.model.opt
-        is_off = option.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-        x, y, z = np.zeros(3) if is_off else option.gravity
+        x, y, z = option.gravity
         if x or y or z > 0.0:
             self.notes["gravity that is not along -z, left out"] = [f"{x:g} {y:g} {z:g}"]
         if option.density or option.viscosity:
@@ -371,22 +447,45 @@ class _MjcfTranslation:
     def _changes(self) -> Iterator[tuple[str, str, Any]]:
         """What is told of elements that are changed or left out, their kind, and a mask of them."""
         mujoco, model = self.mujoco, self.model
-        is_joint = model.jnt_type != mujoco.mjtJoint.mjJNT_FREE
-        yield "joints that are not free, read as rigid", "joint", is_joint
+        is_free, first = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, model.jnt_dofadr
+        yield "joints that are not free, read as rigid", "joint", ~is_free
+        what = "torques of the stiffness and damping of free joints, left out"
+        yield what, "body", self.free[:, :2].any(axis=1)
+        others = [model.dof_frictionloss[first, np.newaxis], model.dof_dampingpoly[first]]
+        has_others = np.hstack([*others, model.jnt_stiffnesspoly]).any(axis=1)
+        what = "frictionloss of free joints and what is not linear in them, left out"
+        yield what, "joint", is_free & has_others
         kinds = [mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD]
         is_known = np.isin(model.eq_type, kinds) & model.eq_active0.astype(bool)
         yield "other equality constraints, left out", "equality", ~is_known
         is_pushing = (model.tendon_lengthspring[:, 0] > 0.0) & (model.tendon_stiffness > 0.0)
         what = "springs that push below their length, read as cables that go slack"
         yield what, "tendon", is_pushing
-        names = "limited actfrclimited frictionloss armature stiffnesspoly dampingpoly springyield"
+        yield "limits of tendons, read as stiff cables", "tendon", self.is_string
+        is_set = model.tendon_limited & ~self.is_string
+        yield "the setting 'limited' of tendons, left out", "tendon", is_set
+        is_low = self.is_string & (model.tendon_range[:, 0] > 0.0)
+        yield "lower limits of tendons, left out", "tendon", is_low
+        names = "actfrclimited frictionloss armature stiffnesspoly dampingpoly springyield"
         for name in names.split():  # earlier versions of MuJoCo have not all of them
             values = getattr(model, f"tendon_{name}", np.zeros(model.ntendon))
             is_set = [np.any(value) for value in values]
             yield f"the setting '{name}' of tendons, left out", "tendon", is_set
-        springs = self.is_linear & model.actuator_biasprm.any(axis=1)
-        yield "actuators with springs, read at control 0", "actuator", springs
-        yield "gravity compensation, left out", "body", model.body_gravcomp
+        acts, drives = self.pushes.any(axis=1), self.driven >= 0
+        for control in np.unique(self.control[acts & drives]).tolist():
+            what = f"actuators with springs or forces, read at control {control:g}"
+            yield what, "actuator", acts & drives & (self.control == control)
+        is_limited = self.pushes[:, 1:].any(axis=1) & model.actuator_forcelimited
+        yield "limits of the force of springs of actuators, left out", "actuator", is_limited
+        of_both = np.append(model.tendon_stiffness > 0.0, False)[self.driven]
+        what = "springs of actuators and their tendons, read as one, with one free length"
+        yield what, "actuator", of_both & self.pushes[:, 1].astype(bool)
+        has_none = np.append((self.laws[:, 0] <= 0.0) | self.is_string, False)
+        is_alone = drives & acts & has_none[self.driven]
+        yield "forces on tendons without stiffness, left out", "actuator", is_alone
+        yield "the armature of actuators, left out", "actuator", model.actuator_armature
+        yield "mocap bodies, read as fixed", "body", model.body_mocapid >= 0
+        yield "plug-ins, left out", "body", model.body_plugin >= 0
         yield "key frames, left out", "key", np.ones(model.nkey)
         yield "flexible parts, left out", "flex", np.ones(model.nflex)
 

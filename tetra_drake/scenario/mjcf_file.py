@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
+from tetra_drake.settings.refusals import hint
 
+_LONGEST_REASON = 150
 LARGEST_MJCF = 2**22
 """Largest size of a file in bytes."""
 
@@ -29,8 +32,9 @@ def is_mjcf(file: str | Path) -> bool:
     return Path(file).suffix.lower() in (".xml", ".mjcf")
 
 
-def compiled_model(file: Path) -> tuple[Any, list[str]]:
-    """MuJoCo's model (mjModel) of a file, and the attributes that were left out.
+def compiled_model(file: Path, *, without: Collection[str] = ()) -> tuple[Any, list[str]]:
+    """MuJoCo's model (mjModel) of a file, `without` bodies of these names and all that refers to
+    them, and the attributes that were left out.
 
     Raises InputError if the file is no MJCF, if MuJoCo refuses it, or if MuJoCo is missing.
     """
@@ -44,14 +48,22 @@ def compiled_model(file: Path) -> tuple[Any, list[str]]:
         mujoco.set_mju_user_warning(lambda message: None)
     left_out = _modernise(root)
     try:
-        if not left_out:
+        if not left_out and not without:
             return mujoco.MjModel.from_xml_path(str(file)), left_out
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
         spec.modelfiledir = os.path.abspath(file.parent)
+        for name in without:
+            bodies = {body.name: body for body in spec.bodies[1:]}  # without those in deleted ones
+            if name not in bodies:
+                problem = f"found no body '{name}' to leave out; {hint(name, bodies)}"
+                raise InputError(file, "without", problem)
+            spec.delete(bodies[name])
         return spec.compile(), left_out
-    except (ValueError, mujoco.FatalError) as error:
-        problem = f"mujoco refuses the file: {' '.join(str(error).split())}"
-        raise InputError(file, "", problem) from error
+    except InputError:
+        raise
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split())[-_LONGEST_REASON:]  # ends with what was found
+        raise InputError(file, "", f"mujoco refuses the file: {reason}") from error
 
 
 def _parsed(file: Path, folder: Path, seen: set[Path]) -> ElementTree.Element:
@@ -69,6 +81,8 @@ def _parsed(file: Path, folder: Path, seen: set[Path]) -> ElementTree.Element:
         raise InputError(file, "", f"is not XML: {error}") from error
     for parent in [*root.iter()]:
         for place, child in reversed([*enumerate(parent)]):
+            if child.tag == "model":  # MuJoCo reads a file that attaches itself for ever
+                _parsed(folder / child.get("file", ""), folder, {*seen})
             if child.tag == "include":
                 included = _parsed(folder / child.get("file", ""), folder, seen)
                 parent[place : place + 1] = included

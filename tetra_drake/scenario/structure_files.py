@@ -85,13 +85,19 @@ def with_structure(tree: Tree, source: object) -> Tree:
     robot = tree.get("robot")
     if not isinstance(robot, dict) or robot.get(TAG, _KIND) != _KIND or "file" not in robot:
         return tree
-    changes = {key: value for key, value in robot.items() if key not in (TAG, "file")}
+    changes = {key: value for key, value in robot.items() if key not in (TAG, "file", "without")}
     name = robot["file"]
     if not isinstance(name, str) or not os.path.exists(structure_file(name, Path())):
         problem = no_such("structure file", str(name), structure_names())
         raise InputError(source, "robot.file", f"{described(name)}: {problem}")
     file = structure_file(name, Path())
-    content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
+    if isinstance(without := robot.get("without"), str) and is_mjcf(file):
+        content = mjcf_tree(file, without=[name.strip() for name in without.split(",")])
+    elif without is not None:
+        problem = f"found {described(without)}, expected bodies of a file of MuJoCo, such as a, b"
+        raise InputError(source, "robot.without", problem)
+    else:
+        content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
     section = _structure(content, file)
     return tree | {"robot": {TAG: _KIND} | merged(content, changes, "robot", section=section)}
 
