@@ -70,7 +70,7 @@ ELEMENTS = {
 """Names of the simplex's cables in its measurements."""
 FACTS = read_json(HERE / "blind_measured.json", "measured values")
 LOADING = {1.5: "simplex_loading.csv", 8.5: "simplex_loading_8.5kN.csv"}
-"""Files of the measured heights and forces under load by self-stress (kN)."""
+"""Files of what was measured under load, by self-stress (kN)."""
 LEAP = 6
 """Number of sets of cable lengths from one pose of the spine that is computed to the next. Between
 them, the difference from the pose of the authors' statics is interpolated."""
@@ -565,13 +565,8 @@ def measured_peaks() -> dict[str, float]:
 def measured_lifts() -> dict[str, float]:
     """Measured twists (degrees) at which Laika's feet lift."""
     lifts = {name[0]: abs(mean) for name, (mean, _) in FACTS["laika_lift_deg"].items()}
-    feet = [name for names, *_ in FEET.values() for name in names]
-    return {f"lift of the {name} foot": lifts[name[-2]] for name in feet}
-
-
-def measured_heights() -> dict[str, float]:
-    """Measured heights (mm) of the jumper's nodes above the lowest one, sorted."""
-    return {f"height {i}": z for i, z in enumerate(FACTS["eth_rest_heights_mm"], start=1)}
+    names = (name for names, *_ in FEET.values() for name in names)
+    return {f"lift of the {name} foot": lifts[name[-2]] for name in names}
 
 
 def twisted(scenario: Scenario, degrees: float) -> Scenario:
@@ -675,7 +670,7 @@ def cases() -> dict[str, Case]:
             200,
             "springs to 5 %, their free lengths to 3 mm each, rods to 1 mm; heights above the "
             "lowest node; markers to 2 mm; without the slack actuators",
-            measured_heights,
+            lambda: {f"height {i}": z for i, z in enumerate(FACTS["eth_rest_heights_mm"], 1)},
         ),
         "anew_simplex_loads": simplex_loads_case(8.5, (0.0, 0.2, 0.4, 0.6, 0.8), means=False),
         "anew_simplex_tightened": simplex_tightened_case((-1.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0)),
