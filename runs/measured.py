@@ -453,7 +453,7 @@ The structures; [blind_measured.json](blind_measured.json) has what was measured
 
 def measured_rows() -> dict[str, pandas.DataFrame]:
     """Predictions that have a measured value: those whose measured values were known, the blind
-    ones as they were committed, and those of the same quantities made anew."""
+    ones as they were committed, and predictions of the same quantities made anew."""
     found = {name: intervals_of(name, case) for name, case in cases().items()}
     blind = committed()
     spine = found["spine"]
