@@ -322,8 +322,8 @@ several mm; its authors suspect that the tubes bend, and ours stay straight.
 The intervals include it: under a force *P*, a tube that is bowed by *a* without load is shorter by
 *π² a² / (4 l (1 - P / Pc)²)*; its buckling load *Pc* is 10.66 kN. The tubes sag by 0.7 mm under
 their weight and are bowed by 0.5 to 1 mm besides, which fits the tests at 8.5 kN. At 2.08 kN this
-lowers the upper nodes by 2.5 of the missing 4 mm; the forces stay 3 to 7 % too high there, as a bow
-of 3 mm would correct. Below 1 kN it moves nothing.
+lowers the upper nodes by 2.5 of the missing 4 mm; the forces stay 3 to 7 % too high there, and a
+greater bow would fit better. Below 1 kN it moves nothing.
 
 {simplex_loads}
 
