@@ -31,11 +31,11 @@ from measured_robots import (
     vibrating,
     wound_up,
 )
-from scipy.optimize import brentq
+from scipy.optimize import brentq, linear_sum_assignment
 
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError
-from tetra_drake.files import write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
@@ -68,6 +68,9 @@ ELEMENTS = {
     "vertical n0 n3": "CV1",
 }
 """Names of the simplex's cables in its measurements."""
+FACTS = read_json(HERE / "blind_measured.json", "measured values")
+LOADING = {1.5: "simplex_loading.csv", 8.5: "simplex_loading_8.5kN.csv"}
+"""Files of what was measured under load, by self-stress (kN)."""
 LEAP = 6
 """Number of sets of cable lengths from one pose of the spine that is computed to the next. Between
 them, the difference from the pose of the authors' statics is interpolated."""
@@ -124,7 +127,7 @@ class Case(NamedTuple):
     draws: int
     assumed: str
     measured: Callable[[], dict[str, float]] = dict
-    """Measured values by quantity; none for blind predictions."""
+    """Measured values by quantity."""
 
 
 def predicted(name: str, case: Case) -> pandas.DataFrame:
@@ -156,9 +159,9 @@ def predicted(name: str, case: Case) -> pandas.DataFrame:
         rows["mostly from"] = [_most(share) for _, share in shares.iterrows()]
         rows.insert(0, "quantity", rows.index)
         rows.insert(0, "structure", case.structure)
-        words = [KINDS[str(q).split()[0].rstrip("0123456789")] for q in rows["quantity"]]
-        rows.insert(2, "kind", [kind for kind, _ in words])
-        rows.insert(3, "unit", [unit for _, unit in words])
+        kinds = [kind_and_unit(str(quantity)) for quantity in rows["quantity"]]
+        rows.insert(2, "kind", [kind for kind, _ in kinds])
+        rows.insert(3, "unit", [unit for _, unit in kinds])
         KEPT.mkdir(exist_ok=True)
         write_whole(file, rows.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
     rows = pandas.read_csv(file)
@@ -166,6 +169,24 @@ def predicted(name: str, case: Case) -> pandas.DataFrame:
     rows["measured"] = [measured.get(quantity, math.nan) for quantity in rows["quantity"]]
     rows["assumed"] = case.assumed
     return rows
+
+
+def committed() -> pandas.DataFrame:
+    """The blind predictions as they were committed, with what was measured afterwards."""
+    rows = pandas.read_csv(HERE / "blind.csv")
+    rows.insert(2, "kind", [kind_and_unit(quantity)[0] for quantity in rows["quantity"]])
+    measured = {
+        (case.structure, quantity): value
+        for case in cases().values()
+        for quantity, value in case.measured().items()
+    }
+    keys = zip(rows["structure"], rows["quantity"], strict=True)
+    return rows.assign(measured=[measured.get(key, math.nan) for key in keys])
+
+
+def kind_and_unit(quantity: str) -> tuple[str, str]:
+    """Kind and unit of a quantity."""
+    return KINDS[quantity.split()[0].rstrip("0123456789")]
 
 
 def _most(shares: pandas.Series) -> str:
@@ -234,7 +255,8 @@ def readings(robot: Robot, unknown: dict[str, float]) -> dict[str, float]:
     found |= {f"S{i}": -force / 1e3 for i, force in enumerate(struts.tolist(), start=1)}
     gain = 1.0 + unknown["gain of the force readings"]
     found = {key: force * gain for key, force in found.items()}
-    found |= {f"H{node[1]}": 1e3 * study.nodes.loc[node, "z"] for node in UPPER}
+    all_heights = unknown["heights of a test"]
+    found |= {f"H{node[1]}": 1e3 * study.nodes.loc[node, "z"] + all_heights for node in UPPER}
     return {key: value + unknown[f"reading:{key}"] for key, value in found.items()}
 
 
@@ -290,8 +312,19 @@ def simplex_tightened(
 
 def simplex_tightened_case(lengthenings: Sequence[float]) -> Case:
     """Forces of the simplex as its tube S1 is lengthened, in mm."""
-    loaded = simplex_loads_case(TIGHTENED_FROM / 1e3, (), is_known=False)
+    loaded = simplex_loads_case(TIGHTENED_FROM / 1e3, (), means=False)
     unknowns = {key: each for key, each in loaded.unknowns.items() if key != "load"}
+
+    def measured() -> dict[str, float]:
+        table = pandas.read_csv(HERE / "simplex_tightening.csv")
+        table = table[(table["figure"] == "5c") & (table["quantity"] == "force")]
+        return {
+            f"{member} at {by:+g} mm": float(np.interp(by, own["x"], own["value"]))
+            for member, own in table.groupby("element")
+            for by in lengthenings
+            if own["x"].min() < by < own["x"].max()
+        }
+
     return Case(
         "simplex, tightened",
         loaded.scenario,
@@ -300,49 +333,50 @@ def simplex_tightened_case(lengthenings: Sequence[float]) -> Case:
         60,
         "the tube S1 is lengthened, by steps known to 0.03 mm from a self-stress of 1.5 kN known "
         "to 0.025 kN; tubes, stiffnesses, masses, supports and readings of forces as under load",
+        measured,
     )
 
 
-def simplex_loads_case(self_stress: float, loads: Sequence[float], *, is_known: bool) -> Case:
-    """Heights and forces of the simplex at a self-stress (kN) under loads (kN) per upper node."""
+def simplex_loads_case(self_stress: float, loads: Sequence[float], *, means: bool) -> Case:
+    """Heights and forces of the simplex at a self-stress (kN) under loads (kN) per upper node; or
+    their means."""
     unknowns = {
         "self-stress": Unknown(0.0, 25.0, "normal"),
-        "bow of the tubes": Unknown(1.5e-3, 1.5e-3),
+        "bow of the tubes": Unknown(0.75e-3, 0.25e-3),
         "buckling load": Unknown(0.0, 0.03, "normal"),
         "load": Unknown(0.0, 0.01, "normal"),
         "gain of the force readings": Unknown(0.0, 0.02, "normal"),
+        "heights of a test": Unknown(0.0, 1.5),
     }
     unknowns |= {f"reading:{key}": Unknown(0.0, 0.025, "normal") for key in ELEMENTS.values()}
     unknowns |= {f"reading:S{i}": Unknown(0.0, 0.025, "normal") for i in (1, 2, 3)}
     unknowns |= {f"reading:H{i}": Unknown(0.0, 1.0) for i in (3, 4, 5)}
 
     def measured() -> dict[str, float]:
-        table = pandas.read_csv(HERE / "simplex_loading.csv")
+        table = pandas.read_csv(HERE / LOADING[self_stress])
         table = table[table["quantity"] != "angle"]
-        table["kind"] = table["element"].str[:-1].where(table["quantity"] != "height", "H")
+        names = table["element"].str[:-1] if means else table["element"]
         found: dict[str, float] = {}
         at = table.groupby("step")["x"].mean()
         for load in loads:
             step = (at - load).abs().idxmin()
-            means = table[table["step"] == step].groupby("kind")["value"].mean()
-            found |= {f"{kind} at {load:.2f} kN": value for kind, value in means.items()}
+            values = table[table["step"] == step].groupby(names)["value"].mean()
+            found |= {f"{name} at {load:.2f} kN": value for name, value in values.items()}
         return found
 
     def predict(scenario: Scenario, unknown: dict[str, float]) -> dict[str, float]:
-        return simplex_loads(
-            scenario, unknown, self_stress=self_stress, loads=loads, means=is_known
-        )
+        return simplex_loads(scenario, unknown, self_stress=self_stress, loads=loads, means=means)
 
     return Case(
         f"simplex, {self_stress:g} kN",
         lambda: in_the_air("simplex"),
         unknowns,
         one_by_one(predict),
-        100 if is_known else 60,
-        "tubes bowed by up to 1/1000 of their length, in place of the straight ones; stiffnesses "
-        "and masses to 2 %, the buckling load to 3 %; pinned ends; a rail without friction; "
-        "readings to 1 mm and 0.025 kN, all forces to 2 %, loads to 1 %",
-        measured if is_known else dict,
+        100 if means else 60,
+        "tubes bowed by 0.5 to 1 mm, in place of the straight ones; stiffnesses and masses to 2 %, "
+        "the buckling load to 3 %; pinned ends; a rail without friction; readings to 1 mm and "
+        "0.025 kN, all heights of a test to 1.5 mm, all forces to 2 %, loads to 1 %",
+        measured,
     )
 
 
@@ -426,11 +460,10 @@ def spine_path(
 
 
 def spine_case() -> Case:
-    """Mean and range of the spine's poses in twelve tests with the same cable lengths; three have
-    measured poses."""
-    table = pandas.read_csv(HERE / "spine_poses.csv")
-    further = pandas.read_csv(HERE / "spine_commands.csv")
-    tests = [*table["test"].unique(), *further["test"].unique()]
+    """Mean and range of the spine's poses in twelve tests with the same cable lengths."""
+    files = ("spine_poses.csv", "spine_poses_further.csv")
+    table = pandas.concat([pandas.read_csv(HERE / file) for file in files])
+    tests = table["test"].unique().tolist()
     path = table[table["test"] == tests[0]]
 
     def measured() -> dict[str, float]:
@@ -500,10 +533,10 @@ def standing(name: str) -> Scenario:
 
 
 def jumper_heights(scenario: Scenario, unknown: dict[str, float]) -> dict[str, float]:
-    """Heights of the jumper's nodes at rest, sorted, above a floor that is not quite known."""
+    """Heights of the jumper's nodes at rest above the lowest one, sorted."""
     heights = 1e3 * study_equilibrium(Robot.of(scenario)).nodes["z"].to_numpy()
-    seen = heights - unknown["foot"] + [unknown[f"marker:{i}"] for i in range(1, 13)]
-    return {f"height {i}": z for i, z in enumerate(np.sort(seen).tolist(), start=1)}
+    lowest, *others = sorted(heights + [unknown[f"marker:{i}"] for i in range(1, 13)])
+    return {f"height {i}": z - lowest for i, z in enumerate(others, start=2)}
 
 
 # The hexagonal prism, and Laika
@@ -518,6 +551,22 @@ def prism_frequencies(scenario: Scenario, unknown: dict[str, float]) -> dict[str
 
 MODES = 9
 """Number of modes of the hexagonal prism below 14 Hz."""
+
+
+def measured_peaks() -> dict[str, float]:
+    """Measured natural frequencies of the prism, each at another one of the modes: all together as
+    near to the predicted medians as they can be."""
+    peaks = np.array(FACTS["hex_prism_peaks_hz"])
+    medians = pandas.read_csv(KEPT / "blind_prism.csv")["median"].to_numpy()
+    rows, modes = linear_sum_assignment(np.abs(np.log(peaks[:, None] / medians)))
+    return {f"frequency {mode + 1}": peaks[row] for row, mode in zip(rows, modes, strict=True)}
+
+
+def measured_lifts() -> dict[str, float]:
+    """Measured twists (degrees) at which Laika's feet lift."""
+    lifts = {name[0]: abs(mean) for name, (mean, _) in FACTS["laika_lift_deg"].items()}
+    names = (name for names, *_ in FEET.values() for name in names)
+    return {f"lift of the {name} foot": lifts[name[-2]] for name in names}
 
 
 def twisted(scenario: Scenario, degrees: float) -> Scenario:
@@ -577,10 +626,11 @@ def laika_lifts(scenario: Scenario, unknown: dict[str, float]) -> dict[str, floa
 
 
 def cases() -> dict[str, Case]:
-    """All cases by the names of their files."""
+    """All cases by the names of their files. What has changed since the blind predictions were
+    committed is predicted anew; the model of the prism and of Laika is the same."""
     loads = (0.0, 0.3, 0.6, 1.0, 2.08)
     return {
-        "simplex_loads": simplex_loads_case(1.5, loads, is_known=True),
+        "simplex_loads": simplex_loads_case(1.5, loads, means=True),
         "simplex_frequencies": simplex_frequencies_case((1.5, 2.5)),
         "spine": spine_case(),
         "jumps": jumper_case(),
@@ -593,6 +643,7 @@ def cases() -> dict[str, Case]:
             "0.2 to 3.8 g of sensors, marker and joint at each node; strings to 20 %, their "
             "tension to 20 %; nodes to 2 mm; straight stiff bars; hung without effect; 4 % for "
             "what the model may lack",
+            measured_peaks,
         ),
         "blind_laika": Case(
             "Laika",
@@ -609,19 +660,19 @@ def cases() -> dict[str, Case]:
             "lattice to 10 %, tensions to 3 %, masses to 3 to 10 %, centre of mass to 2 mm "
             "sideways; feet without friction; a foot counts as lifted below 0 to 0.3 N; its load "
             "is linear in the twist to 10 %",
+            measured_lifts,
         ),
-        "blind_jumper": Case(
+        "anew_jumper": Case(
             "jumper, at rest",
             lambda: standing("eth_jumper"),
-            {"foot": Unknown(7.5, 7.5)}
-            | {f"marker:{i}": Unknown(0.0, 2.0, "normal") for i in range(1, 13)},
+            {f"marker:{i}": Unknown(0.0, 2.0, "normal") for i in range(1, 13)},
             one_by_one(jumper_heights),
             200,
-            "springs to 5 %, their free lengths to 3 mm each, rods to 1 mm; heights above a floor "
-            "that is 0 to 15 mm above the spheres' lowest points; markers to 2 mm; without the "
-            "slack actuators",
+            "springs to 5 %, their free lengths to 3 mm each, rods to 1 mm; heights above the "
+            "lowest node; markers to 2 mm; without the slack actuators",
+            lambda: {f"height {i}": z for i, z in enumerate(FACTS["eth_rest_heights_mm"], 1)},
         ),
-        "blind_simplex_loads": simplex_loads_case(8.5, (0.0, 0.2, 0.4, 0.6, 0.8), is_known=False),
-        "blind_simplex_tightened": simplex_tightened_case((-1.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0)),
-        "blind_simplex_frequencies": simplex_frequencies_case((3.5, 4.5, 5.5)),
+        "anew_simplex_loads": simplex_loads_case(8.5, (0.0, 0.2, 0.4, 0.6, 0.8), means=False),
+        "anew_simplex_tightened": simplex_tightened_case((-1.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0)),
+        "anew_simplex_frequencies": simplex_frequencies_case((3.5, 4.5, 5.5)),
     }

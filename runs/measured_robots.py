@@ -19,6 +19,8 @@ from tetra_drake.robot.struts import axial_forces
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.tolerances import Tolerance, variates_of
+from tetra_drake.settings.section import value_at
 from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.study.fit import Fit, fit_values
 from tetra_drake.study.measurements import Rest
@@ -27,7 +29,7 @@ HERE = Path(__file__).parent / "measured"
 
 SOFTNESS = 0.717e-3 / 1.5e3
 """Lengthening (m) of the simplex's struts per self-stress (N), as published; nearly linear."""
-SELF_STRESSES = {1.5: 2.54, 2.5: 3.04}
+SELF_STRESSES = dict(pandas.read_csv(HERE / "simplex_frequencies.csv").to_numpy().tolist())
 """Measured first frequency (Hz) of the simplex by its self-stress (kN)."""
 TUBE, GRAVITY = 2.63, 9.81
 """Mass (kg) of a strut of the simplex, and acceleration of gravity (m/s²)."""
@@ -84,14 +86,12 @@ def at_rest(robot: Robot) -> dict[str, np.ndarray]:
 
 
 def lengthened(scenario: Scenario, lengthening: float, *, struts: int = 3) -> Scenario:
-    """A simplex with its first struts lengthened, in m."""
-    structure = structure_of(scenario)
-    changes: dict[str, object] = {}
-    for a, b in structure.struts["tube"].pairs[:struts]:
-        start, end = np.array(structure.nodes[a]), np.array(structure.nodes[b])
-        shift = 0.5 * lengthening * (end - start) / np.linalg.norm(end - start)
-        for node, place in ((a, start - shift), (b, end + shift)):
-            changes[f"robot.nodes.{node}"] = [f"{x!r} m" for x in place.tolist()]
+    """A simplex with its first struts lengthened, in m. Its supports keep their places."""
+    tree, changes = scenario.model_dump(), dict[str, object]()
+    by_one_metre = {"robot.struts.tube.length": Tolerance(size="1 m", each=True)}
+    for variate in variates_of(tree, by_one_metre)[:struts]:
+        for key, moved in variate.deviations.items():
+            changes[key] = f"{value_at(tree, key) + lengthening * moved!r} m"
     return scenario.with_changes(changes)
 
 

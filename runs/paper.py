@@ -10,7 +10,6 @@ from __future__ import annotations
 import datetime
 import sys
 from pathlib import Path
-from typing import Any
 
 import jinja2
 import numpy as np
@@ -18,9 +17,7 @@ import pandas
 import tables
 from corpus import ENGINES
 from corpus import MEASURED as CORPUS
-from measured import HERE as MEASURED
-from measured import intervals_of, is_inside
-from measured_intervals import cases
+from measured import Score, measured_rows
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_json, read_text, write_whole
@@ -61,17 +58,13 @@ def size_table(rows: pandas.DataFrame) -> TextTable:
     return TextTable([*head, "sources, largest difference (%)", "times real time"], lines)
 
 
-def measured_totals() -> tuple[dict[str, dict[str, Any]], int]:
-    """Number of measured values, median error and number inside the interval, by kind of quantity
-    and of all; and the number of quantities that are predicted but not measured."""
-    rows = pandas.concat([intervals_of(name, case) for name, case in cases().items()])
-    known = rows[rows["measured"].notna()]
-    totals = {}
-    for kind, group in [*known.groupby("kind", sort=False), ("all", known)]:
-        error = (100.0 * (group["median"] / group["measured"] - 1.0).abs()).median()
-        inside = sum(is_inside(row) for _, row in group.iterrows())
-        totals[str(kind)] = {"count": len(group), "error": fixed(error, 1), "inside": inside}
-    return totals, len(pandas.read_csv(MEASURED / "blind.csv"))
+def measured_totals() -> dict[str, Score]:
+    """Scores of the predictions whose measured values were known, by kind of quantity and of all,
+    and of the blind ones as they were committed."""
+    rows = measured_rows()
+    known = rows["known"]
+    groups = [*known.groupby("kind", sort=False), ("all", known), ("blind", rows["blind"])]
+    return {str(kind): Score.of(group) for kind, group in groups}
 
 
 def agreement(runs: tables.Runs) -> dict[str, str | int]:
@@ -111,7 +104,6 @@ def released(citation: Path = CITATION) -> datetime.date:
 def paper() -> str:
     """Text of the paper, whose date is the day of the last release."""
     rows, runs = corpus_rows(), tables.load_all()
-    measured, blind = measured_totals()
     trials = runs["thesis"].best_gaits
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     template = environment.from_string(read_text(TEMPLATE, "template"))
@@ -132,8 +124,7 @@ def paper() -> str:
             name: fixed(tables.best_gait(name, runs[name]).reached["compiled"] / INCH, 1)
             for name in ("thesis", "coulomb")
         },
-        measured=measured,
-        blind=blind,
+        measured=measured_totals(),
     )
 
 

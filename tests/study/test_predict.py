@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pandas
 import pytest
-from helpers.anchored import HUNG, scenario_of
+from helpers.anchored import HUNG, SWINGING, scenario_of
 
 import tetra_drake as td
 from tetra_drake.cli import main
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.tolerances import Tolerance, variates_of
 from tetra_drake.scenario.yaml_text import parse_yaml
-from tetra_drake.study.predict import predict, predictions_figure
+from tetra_drake.study.predict import drawn_scenarios, predict, predictions_figure
 
 STIFFNESS, MASS = "robot.cables.line.stiffness", "robot.masses.b"
 WIDTH_90, BAR_MASS = 1.6449, math.pi * 0.004**2 * 0.2 * 1200.0
@@ -83,6 +84,38 @@ def test_numbers_of_one_key_vary_together_or_each_alone_and_struts_get_longer():
     assert [row["low"], row["high"]] == pytest.approx(
         row["nominal"] + np.array([-9e-4, 9e-4]), abs=2e-5
     )
+
+
+def test_the_free_end_of_an_anchored_bar_moves_by_all_of_its_lengthening():
+    known = {"tolerances": {"struts.bar.length": "1 mm uniform"}}
+    found = predict(scenario_of(SWINGING | known), ["a z", "b z"], draws=40).quantities
+    middle, width = found["nominal"], found["high"] - found["low"]
+    assert found.loc["b z", "low"] == pytest.approx(middle["b z"] - 9e-4, abs=2e-5)
+    assert width["b z"] == pytest.approx(1.8e-3, abs=4e-5) and width["a z"] < 1e-8
+
+
+@pytest.mark.parametrize(
+    "anchors",
+    [
+        {},
+        {"a": "xyz"},
+        {"b": "xyz"},
+        {"a": "x", "b": "z"},
+        {"a": "y", "b": "y"},
+        {"a": "xyz", "b": "y"},
+    ],
+    ids=lambda anchors: "_".join(map("".join, anchors.items())),
+)
+def test_a_longer_bar_keeps_what_anchors_hold(anchors):
+    nodes = {"a": [0.0, 0.1, 0.3], "b": [0.4, 0.1, 0.0]}
+    ladder = scenario_of(SWINGING | {"nodes": nodes, "anchors": anchors})
+    known = {"robot.struts.bar.length": Tolerance(size="1 mm")}
+    (drawn,) = drawn_scenarios(ladder, variates_of(ladder.model_dump(), known), np.ones((1, 1)))
+    moved = drawn.robot.nodes
+    assert math.dist(moved["a"], moved["b"]) == pytest.approx(0.501, abs=3e-6)
+    for node, axes in anchors.items():
+        for axis in axes:
+            assert moved[node]["xyz".index(axis)] == nodes[node]["xyz".index(axis)]
 
 
 def test_a_tolerance_in_a_text_is_one_of_the_section_and_is_kept():
@@ -163,6 +196,12 @@ def test_the_figure_shows_percent_of_the_nominal_value_or_nothing():
 def test_a_tolerance_that_fits_no_number_is_refused(key, given, problem, refused):
     with refused("scenario anchored", f"robot.tolerances.{key}", problem):
         hung().with_changes({"robot.tolerances": {key: given}})
+
+
+def test_a_length_between_anchors_has_no_tolerance(refused):
+    held = scenario_of(SWINGING | {"anchors": {"a": "z", "b": "z"}})
+    with refused("scenario anchored", "robot.tolerances.struts.bar.length", "key nodes"):
+        held.with_changes({"robot.tolerances": {"struts.bar.length": "1 mm"}})
 
 
 def test_no_tolerance_no_draw_and_no_such_quantity_are_refused(refused):

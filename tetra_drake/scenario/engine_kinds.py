@@ -70,7 +70,6 @@ class Compiled(EngineSettings):
         """The longest step (s): `max_step`, or `light` if that is less than the default."""
         return self.max_step if self.max_step != _LONGEST_STEP else min(_LONGEST_STEP, light)
 
-
     def tolerance_under(self, friction: FrictionKind, *, is_jointed: bool) -> float:
         """The tolerance in m/s; if not given, the default for this friction, with or without
         joints."""

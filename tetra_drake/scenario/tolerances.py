@@ -163,8 +163,9 @@ def _numbers(value: Any, key: str) -> Iterator[tuple[str, float]]:
 
 def _of_struts(tree: Tree, robot: str, group: str, tolerance: Tolerance) -> list[dict[str, float]]:
     """Changes of the coordinates of both ends of each strut of a group that lengthen the strut by
-    one standard deviation. `robot` stands before the keys of the robot in the tree."""
-    bars = value_at(tree, f"{robot}struts")
+    one standard deviation; nothing moves along an axis of an anchor. `robot` stands before the keys
+    of the robot in the tree."""
+    bars, held = (value_at(tree, f"{robot}{key}") or {} for key in ("struts", "anchors"))
     ends = [node for bar in bars.values() for pair in bar["pairs"] for node in pair]
     parts = []
     for pair in bars[group]["pairs"] if group in bars else ():
@@ -172,8 +173,13 @@ def _of_struts(tree: Tree, robot: str, group: str, tolerance: Tolerance) -> list
             raise ValueError(f"found struts that share {' or '.join(pair)}, expected the key nodes")
         start, end = (np.array(value_at(tree, f"{robot}nodes.{node}")) for node in pair)
         length = float(np.linalg.norm(end - start))
-        half = 0.5 * tolerance.deviation(Quantity(length, "m")) * (end - start) / length
-        both = zip(pair, (-half, half), strict=True)
+        free = [[axis not in held.get(node, "") for axis in "xyz"] for node in pair]
+        shifts = np.outer([-1.0, 1.0], (end - start) / length) * free
+        longer = float((shifts**2).sum())
+        if longer < 1e-4:  # the ends can move across the strut only, to within half a degree
+            raise ValueError(f"found anchors of {' and '.join(pair)}, expected the key nodes")
+        shifts *= tolerance.deviation(Quantity(length, "m")) / longer
+        both = zip(pair, shifts.tolist(), strict=True)
         parts.append({f"{robot}nodes.{n}[{axis}]": x[axis] for n, x in both for axis in range(3)})
     if not parts:
         raise ValueError(f"'{group}' is no group of struts; {hint(group, bars)}")

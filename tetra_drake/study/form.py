@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -69,8 +70,8 @@ def form_find(scenario: GivenScenario, prestress: Mapping[str, str]) -> Scenario
 def _check_range(structure: Structure, tensions: Mapping[str, float]) -> None:
     """Refuses tensions (N) of groups that would leave a cable no free length."""
     found = np.array([tensions[group] for group in structure.cable_groups])
-    law = CableLaw.of(structure.cables)._replace(free_length=0.0 * found)
-    most = elastic_tension(structure.initial_lengths, law)
+    lengths: Any = structure.initial_lengths
+    most = np.asarray(elastic_tension(lengths, CableLaw.of(structure.cables)))
     worst = (found / most).argmax()
     if found[worst] > most[worst]:
         name, limit = structure.cable_names[worst], f"{most[worst]:.4g} N"
