@@ -138,8 +138,9 @@ class Ground(NamedTuple):
         table, stacked = heights.reshape(-1, int(grid.columns)), [heights]
         slopes = [np.diff(table, axis=axis) for axis in (0, 1)]
         is_plane = all(np.ptp(slope) <= 1e-9 * np.abs(slope).max() for slope in slopes)
-        rolled = np.zeros((0 if is_plane else of_round.size and radius.size, len(grid)))
-        for size in np.unique(radius[of_round]) if len(rolled) else ():
+        sizes = () if is_plane else np.unique(radius[of_round])
+        rolled = np.zeros((radius.size if len(sizes) else 0, len(grid)))
+        for size in sizes:
             rolled_grid, more = terrain.rolled_surface(grid, table, size)
             rolled[radius == size] = rolled_grid._replace(first=sum(map(len, stacked)))
             stacked.append(more)

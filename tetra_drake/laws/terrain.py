@@ -286,13 +286,7 @@ def rolled_surface(
     varies = [np.ptp(heights, axis=axis).any() for axis in (0, 1)]
     parts = 8.0 if all(varies) else 64.0
     finest = max(radius, sizes.min()) / parts
-    if grid.is_stepped and radius > 2.0 * np.abs(np.diff(heights, axis=0)).max():
-        n = math.ceil(4.0 * sizes[0] / finest)
-        heights = heights.repeat(n, axis=0)  # sharp edges
-        sizes[0] /= n
-        corner = grid.corner_x - 0.5 * (n - 1) * sizes[0], grid.corner_y
-        grid = SurfaceGrid.of(heights, corner, sizes, is_stepped=False)
-    most = math.ceil(math.sqrt(MOST_ROLLED / heights.size) if all(varies) else MOST_ROLLED)
+    most = max(1.0, (MOST_ROLLED / heights.size) ** (0.5 if all(varies) else 1.0) // 1.0)
     n = np.where(varies, np.minimum(np.ceil(sizes / finest - 1e-9), most), 1.0)
     x, y = (
         low + size / parts * np.arange((rows - 1) * parts + 1)
@@ -307,9 +301,15 @@ def rolled_surface(
     ball = np.stack([u, v, radius**2 - u**2 - v**2], axis=-1)
     ball = ball[ball[:, 2] >= 0.0]
     ball[:, 2] **= 0.5
+    if grid.is_stepped and radius > 2.0 * np.abs(np.diff(heights, axis=0)).max():
+        copies = int(4.0 * n[0])
+        heights = heights.repeat(copies, axis=0)  # sharp edges
+        sharp = sizes / [copies, 1.0]
+        corner = x[0] - 0.5 * (copies - 1) * sharp[0], y[0]
+        grid = SurfaceGrid.of(heights, corner, sharp, is_stepped=False)
     rolled = np.empty((x.size, y.size))
     roll(x, y, ball, grid, np.ascontiguousarray(heights).ravel(), rolled)
-    return SurfaceGrid.of(rolled, grid[:2], sizes / n, is_stepped=False), rolled.ravel()
+    return SurfaceGrid.of(rolled, (x[0], y[0]), sizes / n, is_stepped=False), rolled.ravel()
 
 
 @compiled
