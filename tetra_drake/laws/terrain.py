@@ -85,7 +85,11 @@ class SurfaceGrid(NamedTuple):
 
     @classmethod
     def of(
-        cls, heights: np.ndarray, corner: Sequence[float], cell: Sequence[float], is_stepped: bool
+        cls,
+        heights: np.ndarray,
+        corner: Sequence[float],
+        cell: Sequence[float] | np.ndarray,
+        is_stepped: bool,
     ) -> Self:
         """The grid of control points with these heights (rows, columns); all in m, see Grid."""
         inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding

@@ -129,7 +129,7 @@ def foot_gaps(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
     negative in the ground."""
     frames = ground_frames(p_WN, ground)
     frames[:, terrain.GAP] -= ground.radius
-    for i in np.flatnonzero(ground.radius[: len(ground.rolled)]):
+    for i in np.flatnonzero(ground.radius[: len(ground.rolled)]).tolist():
         grid = terrain.SurfaceGrid(*ground.rolled[i])
         terrain.put_frame(tuple(p_WN[i]), grid, ground.heights, True, i, frames)
     return frames[:, terrain.GAP]
