@@ -80,7 +80,8 @@ def energies_of_a_drop(
     nodes = {"a": [0.0, -0.09, radius], "b": [0.03, 0.09, radius]}
     tree = {"nodes": nodes, "struts": {"axle": bar}, "offsets": [[x, y, z + radius]]}
     scenario = load_scenario("prism").with_sections(robot=StructureFile.model_validate(tree))
-    ground = {"ground.stiffness": stiffness, "ground.damping": 2.0 * stiffness if damped else 0.0}
+    damping = 2.0 * stiffness if damped else 0.0
+    ground = {"ground.stiffness": f"{stiffness} N/m", "ground.damping": f"{damping} N*s/m^2"}
     friction = "!Coulomb {static: 0.5, kinetic: 0.4}" if damped else SMOOTH
     settings = {"terrain": RUGGED[terrain], "friction": friction, **ground}
     fine = "!Compiled {tolerance: 1e-6 m/s, max_step: 1 ms}"
