@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.converged import shortly
+from helpers.states import energy_and_momenta
+from helpers.structures import poses_of, simulated
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
@@ -21,7 +23,7 @@ from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.ground import make_surface
+from tetra_drake.robot.ground import foot_gaps, make_surface
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
@@ -53,6 +55,67 @@ def test_what_is_round_rolls_down_a_slope_by_its_inertia(engine, kind):
     centre = simulate(scenario, seeded_gait(scenario), record=True).path.centre
     way = float(np.linalg.norm(centre[-1] - centre[0]))
     assert way == pytest.approx(0.5 * G * math.sin(SLOPE) / (1.0 + share) * DURATION**2, rel=0.01)
+
+
+SMOOTH = "!Coulomb {static: 1e-9, kinetic: 1e-9}"
+RUGGED = {
+    "steps": "!Steps {height: 20 mm, depth: 90 mm, count: 20, start: 0 mm}",
+    "low steps": "!Steps {height: 5 mm, depth: 60 mm, count: 20, start: 0 mm}",
+    "down": "!Steps {height: -10 mm, depth: 100 mm, count: 20, start: 0 mm}",
+    "rough": "!Rough {amplitude: 10 mm, wavelength: 120 mm}",
+    "obstacles": "!Obstacles {height: 15 mm, radius: 40 mm, spacing: 100 mm, start: -300 mm}",
+}
+"""Terrains with edges and corners that are sharper than a foot of some centimetres."""
+
+
+def energies_of_a_drop(
+    terrain: str, seed: int, *, damped: bool, duration: float = 0.5
+) -> tuple[np.ndarray, float]:
+    """Energies (samples,) in J of two balls on an axle that fall on a terrain, and how far (m) the
+    balls sank in. Size, place and stiffness of the ground are random."""
+    random = np.random.default_rng(seed)
+    radius, stiffness = random.uniform(0.005, 0.06), 10.0 ** random.uniform(3.3, 5.3)
+    x, y, z = random.uniform([-0.1, -0.1, 0.08], [0.4, 0.1, 0.15]).tolist()
+    bar = {"pairs": [["a", "b"]], "diameter": 0.004, "density": 1000.0, "node_diameter": 2 * radius}
+    nodes = {"a": [0.0, -0.09, radius], "b": [0.03, 0.09, radius]}
+    tree = {"nodes": nodes, "struts": {"axle": bar}, "offsets": [[x, y, z + radius]]}
+    scenario = load_scenario("prism").with_sections(robot=StructureFile.model_validate(tree))
+    damping = 2.0 * stiffness if damped else 0.0
+    ground = {"ground.stiffness": f"{stiffness} N/m", "ground.damping": f"{damping} N*s/m^2"}
+    friction = "!Coulomb {static: 0.5, kinetic: 0.4}" if damped else SMOOTH
+    settings = {"terrain": RUGGED[terrain], "friction": friction, **ground}
+    fine = "!Compiled {tolerance: 1e-6 m/s, max_step: 1 ms}"
+    given = shortly(scenario, duration, engine=fine, simulation__sample_period="5 ms", **settings)
+    robot = Robot.of(given)
+    states = simulated(robot)[1].states
+    energy = poses_of(states)[..., 6] @ robot.structure.mass * G
+    energy += [energy_and_momenta(robot, state)[0] for state in states]
+    p_WN = [node_positions(robot.structure, state)[robot.structure.contacts] for state in states]
+    depths = np.maximum(-np.array([foot_gaps(p, robot.ground) for p in p_WN]), 0.0)
+    return energy + 0.5 * stiffness * (depths**2).sum(axis=1), depths.max()
+
+
+@pytest.mark.parametrize(("terrain", "seed"), [(name, i) for i, name in enumerate(RUGGED)])
+def test_edges_and_corners_neither_give_nor_take_energy(terrain, seed):
+    energy, depth = energies_of_a_drop(terrain, seed, damped=False)
+    assert depth > 1e-4
+    assert np.abs(energy - energy[0]).max() < 0.01 * abs(energy[0])
+
+
+def test_feet_that_dissipate_only_lose_energy_at_edges():
+    energy, depth = energies_of_a_drop("low steps", 7, damped=True)
+    assert depth > 1e-4
+    assert np.diff(energy).max() < 1e-4 * (energy[0] - energy[-1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("terrain", RUGGED)
+@pytest.mark.parametrize("seed", range(10, 20))
+def test_any_foot_on_any_ground_keeps_its_energy_or_loses_it(terrain, seed):
+    energy, _ = energies_of_a_drop(terrain, seed, damped=False, duration=2.0)
+    assert np.abs(energy - energy[0]).max() < 0.01 * abs(energy[0])
+    energy, _ = energies_of_a_drop(terrain, seed, damped=True, duration=2.0)
+    assert np.diff(energy).max() < 1e-3 * (energy[0] - energy[-1])
 
 
 def test_a_ball_stands_its_radius_above_the_ground():

@@ -1,19 +1,25 @@
 """The surface of the ground and the frames in it, against planes, differences and splines."""
 
+import math
+
 import numpy as np
 import pytest
 
 from tetra_drake.laws.contact import Ground
 from tetra_drake.laws.terrain import (
+    FRAME_COLUMNS,
     GAP,
     N_X,
     T1_X,
     T2_Y,
     HeightField,
     Incline,
+    Relief,
     Rough,
     Steps,
     SurfaceGrid,
+    put_frame,
+    rolled_surface,
     surface,
 )
 from tetra_drake.robot.ground import ground_frames, ground_heights, make_ground
@@ -116,3 +122,60 @@ def test_a_robot_that_starts_at_rest_may_be_pressed_into_the_ground():
     gaps -= robot.ground.radius
     depth = robot.weight / 3.0 / robot.scenario.ground.stiffness  # three feet bear it
     assert gaps.min() == pytest.approx(-depth, rel=1e-3)
+
+
+def frame_under(centre: np.ndarray, surface: tuple[SurfaceGrid, np.ndarray]) -> np.ndarray:
+    """Frame of a ball with this centre on its rolled surface."""
+    frames = np.empty((1, FRAME_COLUMNS))
+    put_frame(tuple(centre), *surface, True, 0, frames)
+    return frames[0]
+
+
+def rolled(terrain: Relief, radius: float) -> tuple[SurfaceGrid, np.ndarray]:
+    """Rolled surface of a terrain, with its heights."""
+    grid = terrain.grid(ahead=0.0, scale=1.0, source="")
+    base = SurfaceGrid.of(grid.heights, grid.corner, grid.cell, terrain.is_stepped)
+    return rolled_surface(base, grid.heights, radius)
+
+
+STAIRS = Steps(height=0.02, depth=0.08, count=20, start=0.0)
+
+
+@pytest.mark.parametrize("terrain", [STAIRS, Rough(amplitude=0.01, wavelength=0.06)])
+@pytest.mark.parametrize("radius", [0.005, 0.05])
+def test_the_normal_of_a_foot_is_the_gradient_of_its_depth(terrain, radius):
+    # So k depth is the force of an energy k depth^2 / 2, at corners and edges, too.
+    surface_and_heights, generator, h = rolled(terrain, radius), np.random.default_rng(2), 1e-6
+    for x, y, share in generator.uniform([-0.2, -0.2, 0.01], [0.5, 0.2, 0.4], (12, 3)):
+        top, _, _ = surface(x, y, *surface_and_heights)
+        centre = np.array([x, y, top - share * radius])
+        frame = frame_under(centre, surface_and_heights)
+        gaps = [
+            [frame_under(centre + side * axis, surface_and_heights)[GAP] for side in (h, -h)]
+            for axis in np.eye(3)
+        ]
+        gradient = -np.diff(gaps, axis=1)[:, 0] / (2.0 * h)
+        np.testing.assert_allclose(frame[N_X : N_X + 3], gradient, atol=1e-3)
+
+
+@pytest.mark.parametrize("radius", [0.005, 0.02])
+def test_the_gap_of_a_foot_is_its_distance_to_the_nearest_point(ground, radius):
+    terrain = Rough(amplitude=0.01, wavelength=0.15, seed=3)
+    surface_and_heights, made = rolled(terrain, radius), ground(terrain)
+    for x, y in np.random.default_rng(4).uniform(-0.2, 0.4, (10, 2)):
+        centre = np.array([x, y, surface(x, y, *surface_and_heights)[0] - 0.02 * radius])
+        steps = np.linspace(-1.2 * radius, 1.2 * radius, 201)
+        near = np.stack(np.meshgrid(x + steps, y + steps), axis=-1).reshape(-1, 2)
+        points = np.column_stack([near, ground_heights(near, made)])
+        nearest = np.linalg.norm(points - centre, axis=1).min()
+        gap = frame_under(centre, surface_and_heights)[GAP]
+        assert gap == pytest.approx(nearest - radius, abs=0.02 * radius)
+
+
+@pytest.mark.parametrize(("radius", "height"), [(0.05, 0.02), (0.05, 0.005), (0.0125, 0.005)])
+def test_a_ball_meets_a_step_where_its_circle_meets_the_edge(radius, height):
+    stairs = rolled(Steps(height=height, depth=2.0, count=1, start=0.3), radius)
+    x = np.arange(0.2, 0.3, 1e-4)
+    risen = [surface(at, 0.0, *stairs)[0] > radius + 0.002 * radius for at in x]
+    touch = math.sqrt(radius**2 - (radius - height) ** 2)
+    assert 0.3 - x[np.argmax(risen)] == pytest.approx(touch, abs=0.01 * radius)

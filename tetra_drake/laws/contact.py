@@ -2,7 +2,9 @@
 
 A contact node touches the ground with a sphere about it, its *foot*. The ground acts on the foot's
 lowest point, along the normal of the surface. So friction has a lever about the node. A foot
-without radius is the node itself, as in the thesis.
+without radius is the node itself, as in the thesis. On uneven ground, the lowest point of a round
+foot is the one that is deepest in the ground, so that normal forces have a potential energy; see
+`terrain`.
 
 The bristle's deflection is the distance by which the material at the lowest point has slid, not the
 distance by which the point has moved: a foot that rolls does not bend its bristle. Within a step,
@@ -23,12 +25,13 @@ The laws use the frames of `terrain`. On flat ground these are the axes of the w
 
 from __future__ import annotations
 
+import functools
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
 
-from tetra_drake.kernels.compiling import inlined
+from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import (
     Real,
     Table,
@@ -94,8 +97,11 @@ class Ground(NamedTuple):
     grid: Table
     """The fields of terrain.SurfaceGrid as an array."""
     heights: Any
-    """Heights (points,) of the surface's control points in m, row by row. None in lanes, which
-    share one table of heights."""
+    """Heights (points,) of the surface's control points in m, row by row, then of rolled surfaces.
+    None in lanes, which share one table of heights."""
+    rolled: Table
+    """The fields of terrain.SurfaceGrid (contacts, fields), for each foot of the surface that its
+    centre meets. Empty without round feet, and on planes."""
 
     @classmethod
     def nowhere(cls) -> Self:
@@ -112,6 +118,7 @@ class Ground(NamedTuple):
             flat=True,
             grid=np.zeros(len(terrain.SurfaceGrid._fields)),
             heights=none,
+            rolled=np.zeros((0, len(terrain.SurfaceGrid._fields))),
         )
 
     def under(self, centres: Table, *, carriers: Table, radius: Table, nodes: int) -> Self:
@@ -126,15 +133,39 @@ class Ground(NamedTuple):
         of_round = np.flatnonzero(radius)
         contacts = centres.copy()
         contacts[of_round] = nodes + np.arange(of_round.size)
-        surface = terrain.SurfaceGrid(*self.grid)._replace(reach=radius.max(initial=0.0))
+        grid = terrain.SurfaceGrid(*self.grid)
+        heights = self.heights[: round(grid.last_row + 1.5) * int(grid.columns)]
+        table, stacked = heights.reshape(-1, int(grid.columns)), [heights]
+        slopes = [np.diff(table, axis=axis) for axis in (0, 1)]
+        is_plane = all(np.ptp(slope) <= 1e-9 * np.abs(slope).max() for slope in slopes)
+        sizes = () if is_plane else np.unique(radius[of_round])
+        rolled = np.zeros((radius.size if len(sizes) else 0, len(grid)))
+        for size in sizes:
+            rolled_grid, more = terrain.rolled_surface(grid, table, size)
+            rolled[radius == size] = rolled_grid._replace(first=sum(map(len, stacked)))
+            stacked.append(more)
         return self._replace(
             contacts=contacts,
             centres=centres,
             radius=radius,
             carriers=carriers,
             is_round=of_round.size > 0,
-            grid=np.array(surface),
+            grid=np.array(grid._replace(reach=radius.max(initial=0.0))),
+            heights=np.concatenate(stacked),
+            rolled=rolled,
         )
+
+
+@functools.partial(compiled, nogil=True)  # a call of its own: inlined, it slows other robots
+def roll_feet(nodes: Table, ground: Ground, frames: Table) -> None:
+    """Writes the frames of round feet on their rolled surfaces to `frames`. The gap of such a frame
+    is the foot's. `nodes` has the positions of the feet's centres."""
+    rolled, base = ground.rolled, named(terrain.SurfaceGrid, ground.grid)
+    for i in range(rolled.shape[0]):
+        if ground.contacts[i] != ground.centres[i]:
+            grid = terrain.row_of(rolled, i, base.first)
+            place = vector_at(nodes, ground.centres[i], kinematics.P_WN)
+            terrain.put_frame(place, grid, ground.heights, True, i, frames)
 
 
 @inlined
@@ -155,11 +186,14 @@ def meet_ground(ground: Ground, state: Table, nodes: Table, frames: Table) -> No
         terrain.find_frames(nodes, ground.centres, grid, ground.heights, frames)
     if not ground.is_round:
         return
+    is_rolled = ground.rolled.shape[0] > 0
+    if is_rolled:
+        roll_feet(nodes, ground, frames)
     for i in range(ground.contacts.size):
         centre, foot, radius = ground.centres[i], ground.contacts[i], ground.radius[i]
         if foot == centre:
             continue
-        if not ground.flat:
+        if not ground.flat and not is_rolled:
             frames[i, terrain.GAP] -= radius
         drop = terrain.to_world(0.0, 0.0, -radius, frames, i, ground.flat)
         turns = cross(kinematics.angular_velocity(state, ground.carriers[i]), drop)

@@ -7,6 +7,12 @@ The surface is a uniform biquadratic B-spline. Its control points are a regular 
 gradient is continuous, a plane is exact, and no point is higher than the highest control point. An
 edge is rounded over one cell. Beyond the grid the surface continues with the height at the border.
 
+A point touches this surface. The centre of a round foot must stay above the *rolled surface*, on
+which the centre of a ball moves that rolls over the ground. The depth of the foot is the distance
+of its centre from the nearest place of the rolled surface, along whose normal the ground pushes.
+Where the ball touches one place of the ground, this is the depth of the foot's lowest point. In a
+corner, where it touches two, both push. The rolled surface is a spline on a finer grid.
+
 A *frame* is a row of the table `frames`. It has the distance of a node from the surface, positive
 above it, and the axes of the tangent plane: normal n, t1 (the world's x axis projected into the
 plane), and t2 = n x t1. On flat ground the axes are the world's, and `frames` is not used.
@@ -15,9 +21,10 @@ plane), and t2 = n x t1. On flat ground the axes are the world's, and `frames` i
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -37,7 +44,7 @@ from tetra_drake.kernels.lanes import (
 )
 from tetra_drake.laws.height_files import HeightFile, HeightPath
 from tetra_drake.laws.kinematics import P_WN
-from tetra_drake.laws.vectors import Vector3, put_vector
+from tetra_drake.laws.vectors import Vector3, put_vector, vector_at
 from tetra_drake.settings.quantities import Angle, Length
 from tetra_drake.settings.section import Kinds, Section, settings_text
 from tetra_drake.settings.units import INCH
@@ -45,6 +52,11 @@ from tetra_drake.settings.units import INCH
 GAP, N_X, N_Y, N_Z, T1_X, T1_Y, T1_Z, T2_Y, T2_Z, FRAME_COLUMNS = range(10)
 """Columns of the table `frames` (contacts, 9), and their number: distance of the node from the
 surface (m), axes n and t1, and axis t2 without its x, which is 0."""
+
+MOST_ROLLED = 1 << 18
+"""Largest number of heights of a finer grid; see rolled_surface()."""
+MOST_TRIALS, NEAR = 24, 1e-7
+"""Most places that nearest_plane() tries, and its last step as a share of the depth."""
 
 
 class SurfaceGrid(NamedTuple):
@@ -66,13 +78,48 @@ class SurfaceGrid(NamedTuple):
     """Index of the first control point in the heights."""
     top: Real
     """Height of the highest control point."""
+    is_stepped: Real
+    """1 if balls that are large enough meet sharp edges between unequal heights, otherwise 0."""
     reach: Real
     """Largest radius of a foot."""
+
+    @classmethod
+    def of(
+        cls,
+        heights: np.ndarray,
+        corner: Sequence[float],
+        cell: Sequence[float] | np.ndarray,
+        is_stepped: bool,
+    ) -> Self:
+        """The grid of control points with these heights (rows, columns); all in m, see Grid."""
+        inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding
+        return cls(
+            corner_x=corner[0],
+            corner_y=corner[1],
+            per_cell_x=1.0 / cell[0],
+            per_cell_y=1.0 / cell[1],
+            last_row=heights.shape[0] - inside,
+            last_column=heights.shape[1] - inside,
+            columns=heights.shape[1],
+            first=0.0,
+            top=heights.max(),
+            is_stepped=float(is_stepped),
+            reach=0.0,
+        )
 
 
 @inlined
 def surface(x: Real, y: Real, grid: SurfaceGrid, heights: Table) -> tuple[Real, Real, Real]:
-    """Height (m) of the surface at x and y (m), and its gradient: dh/dx and dh/dy.
+    """Height (m) of the surface at x and y (m), and its gradient: dh/dx and dh/dy; see
+    bent_surface()."""
+    height, h_x, h_y, _, _, _ = bent_surface(x, y, grid, heights)
+    return height, h_x, h_y
+
+
+@inlined
+def bent_surface(x: Real, y: Real, grid: SurfaceGrid, heights: Table) -> tuple[Real, ...]:
+    """Height h (m) of the surface at x and y (m), its gradient dh/dx and dh/dy, and its second
+    derivatives d2h/dx2, d2h/dxdy and d2h/dy2.
 
     The surface is a quadratic B-spline. `heights` (points,) are the heights (m) of its control
     points, row by row. Beyond the grid the surface continues with the height at the border.
@@ -85,31 +132,33 @@ def surface(x: Real, y: Real, grid: SurfaceGrid, heights: Table) -> tuple[Real, 
     row, column = floor(s + 0.5), floor(t + 0.5)
     a, b = s - row, t - column
     index = grid.first + (row - 1.0) * grid.columns + (column - 1.0)
-    h_0, b_0 = _across_row(heights, index, b)
-    h_1, b_1 = _across_row(heights, index + grid.columns, b)
-    h_2, b_2 = _across_row(heights, index + 2.0 * grid.columns, b)
-    height, by_a = _spline(h_0, h_1, h_2, a)
-    by_b, _ = _spline(b_0, b_1, b_2, a)
-    h_x = select(s == cells_x, by_a * grid.per_cell_x, 0.0)
-    h_y = select(t == cells_y, by_b * grid.per_cell_y, 0.0)
-    return height, h_x, h_y
+    h_0, b_0, bb_0 = _across_row(heights, index, b)
+    h_1, b_1, bb_1 = _across_row(heights, index + grid.columns, b)
+    h_2, b_2, bb_2 = _across_row(heights, index + 2.0 * grid.columns, b)
+    height, by_a, by_aa = _spline(h_0, h_1, h_2, a)
+    by_b, by_ab, _ = _spline(b_0, b_1, b_2, a)
+    by_bb, _, _ = _spline(bb_0, bb_1, bb_2, a)
+    per_x = select(s == cells_x, grid.per_cell_x, 0.0)
+    per_y = select(t == cells_y, grid.per_cell_y, 0.0)
+    bends = by_aa * per_x * per_x, by_ab * per_x * per_y, by_bb * per_y * per_y
+    return height, by_a * per_x, by_b * per_y, *bends
 
 
 @inlined
-def _across_row(heights: Table, index: Real, b: Real) -> tuple[Real, Real]:
+def _across_row(heights: Table, index: Real, b: Real) -> tuple[Real, Real, Real]:
     before, here = gather(heights, index, 0), gather(heights, index, 1)
     return _spline(before, here, gather(heights, index, 2), b)
 
 
 @inlined
-def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Real]:
-    """Value of a quadratic B-spline and its derivative per cell, from the values of three
-    neighbouring control points. `part` (-1/2 to 1/2) is the distance from the control point `here`,
-    in cells."""
+def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Real, Real]:
+    """Value of a quadratic B-spline and its derivatives per cell, first and second, from the values
+    of three neighbouring control points. `part` (-1/2 to 1/2) is the distance from the control
+    point `here`, in cells."""
     less, more, rise, next_rise = 0.5 - part, 0.5 + part, here - before, after - here
     # Each sum has one product, so there is only one way to round a product and a sum together.
     value = here - 0.5 * less * less * rise + 0.5 * more * more * next_rise
-    return value, rise + more * (next_rise - rise)
+    return value, rise + more * (next_rise - rise), next_rise - rise
 
 
 @compiled
@@ -124,26 +173,79 @@ def find_frames(
     to touch the highest control point gets the frame of level ground at that height.
     """
     for i in range(contacts.size):
-        node = contacts[i]
-        z = nodes[node, P_WN + 2]
-        near = z <= grid.top + grid.reach
-        height, h_x, h_y = grid.top, 0.0 * z, 0.0 * z
-        c = n_z = 0.0 * z + 1.0
-        if any_lane(near):
-            z_at, slope_x, slope_y = surface(
-                nodes[node, P_WN], nodes[node, P_WN + 1], grid, heights
-            )
-            height = select(near, z_at, height)
-            h_x, h_y = select(near, slope_x, h_x), select(near, slope_y, h_y)
-            c = inverse_sqrt(1.0 + h_y * h_y)
-            n_z = inverse_sqrt(1.0 + h_x * h_x + h_y * h_y)
-        frames[i, GAP] = (z - height) * n_z  # exact on a plane
-        put_vector((-h_x * n_z, -h_y * n_z, n_z), i, N_X, frames)
-        frames[i, T1_X] = (1.0 + h_y * h_y) * c * n_z
-        frames[i, T1_Y] = -h_x * h_y * c * n_z
-        frames[i, T1_Z] = h_x * c * n_z
-        frames[i, T2_Y] = c
-        frames[i, T2_Z] = h_y * c
+        put_frame(vector_at(nodes, contacts[i], P_WN), grid, heights, False, i, frames)
+
+
+@inlined
+def put_frame(
+    place: Vector3, grid: SurfaceGrid, heights: Table, is_rolled: bool, i: int, frames: Table
+) -> None:
+    """Writes row i of `frames` for a node at `place` (m); see find_frames(). If the surface
+    `is_rolled`, a node in the ground gets the frame at the nearest place of the surface."""
+    x, y, z = place
+    near = z <= grid.top + grid.reach
+    height, h_x, h_y = grid.top, 0.0 * z, 0.0 * z
+    c = n_z = 0.0 * z + 1.0
+    if any_lane(near):
+        if is_rolled:
+            z_at, slope_x, slope_y = nearest_plane(x, y, z, grid, heights)
+        else:
+            z_at, slope_x, slope_y = surface(x, y, grid, heights)
+        height = select(near, z_at, height)
+        h_x, h_y = select(near, slope_x, h_x), select(near, slope_y, h_y)
+        c = inverse_sqrt(1.0 + h_y * h_y)
+        n_z = inverse_sqrt(1.0 + h_x * h_x + h_y * h_y)
+    frames[i, GAP] = (z - height) * n_z  # exact on a plane
+    put_vector((-h_x * n_z, -h_y * n_z, n_z), i, N_X, frames)
+    frames[i, T1_X] = (1.0 + h_y * h_y) * c * n_z
+    frames[i, T1_Y] = -h_x * h_y * c * n_z
+    frames[i, T1_Z] = h_x * c * n_z
+    frames[i, T2_Y] = c
+    frames[i, T2_Z] = h_y * c
+
+
+@inlined
+def row_of(g: Table, i: int, base: Real) -> SurfaceGrid:
+    """SurfaceGrid from row i of the table `g` (rows, fields). Its first height is counted from
+    the index `base`."""
+    place = g[i, 0], g[i, 1], g[i, 2], g[i, 3], g[i, 4], g[i, 5], g[i, 6]
+    return SurfaceGrid(*place, g[i, 7] + base, g[i, 8], g[i, 9], g[i, 10])
+
+
+@inlined
+def nearest_plane(
+    x: Real, y: Real, z: Real, grid: SurfaceGrid, heights: Table
+) -> tuple[Real, Real, Real]:
+    """Tangent plane at the place of the surface that is nearest to a point in the ground: its
+    height (m) at x and y (m), and its gradient. Above the surface, the plane at x and y itself.
+
+    Newton's method minimizes the squared distance. A step that does not lessen it is tried again
+    at a quarter of its length, because the surface bends sharply in corners.
+    """
+    s, t, height, h_x, h_y = x, y, z, 0.0 * z, 0.0 * z
+    to_s = to_t = 0.0 * z
+    least = 0.0 * z + math.inf
+    for _ in range(MOST_TRIALS):
+        h, by_s, by_t, by_ss, by_st, by_tt = bent_surface(s + to_s, t + to_t, grid, heights)
+        d_x, d_y, rise = s + to_s - x, t + to_t - y, maximum(h - z, 0.0)
+        square = d_x * d_x + d_y * d_y + rise * rise
+        nearer = square < least
+        least = select(nearer, square, least)
+        s, t = select(nearer, s + to_s, s), select(nearer, t + to_t, t)
+        height, h_x = select(nearer, h, height), select(nearer, by_s, h_x)
+        h_y = select(nearer, by_t, h_y)
+        g_s, g_t = d_x + rise * by_s, d_y + rise * by_t
+        ss, st, tt = 1.0 + by_s * by_s, by_s * by_t, 1.0 + by_t * by_t
+        b_ss, b_st, b_tt = ss + rise * by_ss, st + rise * by_st, tt + rise * by_tt
+        is_valley = (b_ss > 0.0) & (b_ss * b_tt > b_st * b_st)
+        ss, st = select(is_valley, b_ss, ss), select(is_valley, b_st, st)
+        tt = select(is_valley, b_tt, tt)
+        per = 1.0 / (ss * tt - st * st)
+        to_s = select(nearer, (st * g_t - tt * g_s) * per, 0.25 * to_s)
+        to_t = select(nearer, (st * g_s - ss * g_t) * per, 0.25 * to_t)
+        if not any_lane(abs(to_s) + abs(to_t) > NEAR * abs(height - z)):
+            break
+    return height + h_x * (x - s) + h_y * (y - t), h_x, h_y
 
 
 @inlined
@@ -173,6 +275,59 @@ def to_world(t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool) -
         t_1 * frames[i, T1_Y] + t_2 * frames[i, T2_Y] + n * frames[i, N_Y],
         t_1 * frames[i, T1_Z] + t_2 * frames[i, T2_Z] + n * frames[i, N_Z],
     )
+
+
+def rolled_surface(
+    grid: SurfaceGrid, heights: np.ndarray, radius: float
+) -> tuple[SurfaceGrid, np.ndarray]:
+    """Grid and heights (points,) in m of the surface that the centre of a ball with this radius (m)
+    passes as it rolls over another surface, which has the `heights` (rows, columns) on `grid`.
+
+    Its cells are an eighth of the radius or of a cell, whichever is larger; a 64th if the ground is
+    the same everywhere along x or y. They are larger if there were more than MOST_ROLLED heights.
+    """
+    sizes = np.array([1.0 / grid.per_cell_x, 1.0 / grid.per_cell_y])
+    varies = [np.ptp(heights, axis=axis).any() for axis in (0, 1)]
+    parts = 8.0 if all(varies) else 64.0
+    finest = max(radius, sizes.min()) / parts
+    most = max(1.0, (MOST_ROLLED / heights.size) ** (0.5 if all(varies) else 1.0) // 1.0)
+    n = np.where(varies, np.minimum(np.ceil(sizes / finest - 1e-9), most), 1.0)
+    x, y = (
+        low + size / parts * np.arange((rows - 1) * parts + 1)
+        for low, size, parts, rows in zip(grid[:2], sizes, n, heights.shape, strict=True)
+    )
+    spacing = np.minimum(sizes / n, radius / parts) / (1.0 if all(varies) else 4.0)
+    steps = [
+        step * np.arange(-(radius // step), radius // step + 1.0) if bends else np.zeros(1)
+        for step, bends in zip(spacing, varies, strict=True)
+    ]
+    u, v = (part.ravel() for part in np.meshgrid(*steps))
+    ball = np.stack([u, v, radius**2 - u**2 - v**2], axis=-1)
+    ball = ball[ball[:, 2] >= 0.0]
+    ball[:, 2] **= 0.5
+    if grid.is_stepped and radius > 2.0 * np.abs(np.diff(heights, axis=0)).max():
+        copies = int(4.0 * n[0])
+        heights = heights.repeat(copies, axis=0)  # sharp edges
+        sharp = sizes / [copies, 1.0]
+        corner = x[0] - 0.5 * (copies - 1) * sharp[0], y[0]
+        grid = SurfaceGrid.of(heights, corner, sharp, is_stepped=False)
+    rolled = np.empty((x.size, y.size))
+    roll(x, y, ball, grid, np.ascontiguousarray(heights).ravel(), rolled)
+    return SurfaceGrid.of(rolled, (x[0], y[0]), sizes / n, is_stepped=False), rolled.ravel()
+
+
+@compiled
+def roll(x: Table, y: Table, ball: Table, grid: SurfaceGrid, heights: Table, rolled: Table) -> None:
+    """Writes the heights `rolled` (rows, columns) in m of the centre of a ball that touches a
+    surface from above, at x (rows,) and y (columns,). `ball` (points, 3) are points of the ball's
+    lower half, from the centre, the last coordinate downward; all in m."""
+    for row in range(x.size):
+        for column in range(y.size):
+            highest = -math.inf
+            for k in range(len(ball)):
+                place = x[row] + ball[k, 0], y[column] + ball[k, 1]
+                highest = max(highest, surface(*place, grid, heights)[0] + ball[k, 2])
+            rolled[row, column] = highest
 
 
 # Settings: a section for each kind of terrain, which gives the heights.
@@ -206,6 +361,8 @@ class Relief(Section):
     """False if there is nothing that nodes could touch."""
     place: ClassVar[str] = "on uneven ground"
     """Words that say where a robot walks, unless the terrain is a slope; empty on level ground."""
+    is_stepped: ClassVar[bool] = False
+    """True if large balls meet sharp edges between unequal heights; see Steps."""
 
     @property
     def plane_slope(self) -> float | None:
@@ -294,10 +451,11 @@ class Steps(Relief):
     Each step has a depth and a height: h = height min(count, floor((x - start) / depth) + 1), and 0
     before `start`. An edge is not vertical: it rises over one cell of the grid of heights before it
     and one behind it. A cell is about as long as a step is high, but at most a quarter of the
-    depth.
+    depth. Round feet with a radius above twice the height meet sharp edges.
     """
 
     place = "over steps"
+    is_stepped = True
 
     height: Length
     """Height of each step above the one before; negative goes down."""

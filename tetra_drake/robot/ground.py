@@ -56,7 +56,8 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     or with a contact node in the ground.
     """
     start = node_positions(structure, structure.initial_state)[structure.contacts]
-    ahead = start[:, 0].max(initial=-np.inf) + STEP_AHEAD * structure.scale  # not used without feet
+    fronts = start[:, 0] + structure.contact_radius[structure.contacts]
+    ahead = fronts.max(initial=-np.inf) + STEP_AHEAD * structure.scale  # not used without feet
     grid = scenario.terrain.grid(ahead=ahead, scale=structure.scale, source=scenario.name)
     surface = make_surface(scenario.ground, scenario.friction, scenario.terrain, grid)
     made = surface.under(
@@ -73,7 +74,7 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
         reach = " to ".join(", ".join(shown(x, "m") for x in corner) for corner in (near, far))
         problem = f"the robot starts off its grid, which goes from x, y = {reach}"
         raise InputError(scenario.name, "terrain", problem)
-    gaps = ground_frames(start, made)[:, terrain.GAP] - made.radius
+    gaps = foot_gaps(start, made)
     weight = float(structure.mass.sum()) * scenario.robot.gravity
     if gaps.min() < -START_DEPTH * structure.scale - weight / scenario.ground.stiffness:
         node = structure.node_names[structure.contacts[gaps.argmin()]]
@@ -93,20 +94,8 @@ def make_surface(
     `grid` has the terrain's heights. By default it is made from `terrain_kind`, whose steps or
     obstacles begin at x = 0 if its settings give no start."""
     grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
-    rows, columns = grid.heights.shape
-    inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding
-    surface_grid = terrain.SurfaceGrid(
-        corner_x=grid.corner[0],
-        corner_y=grid.corner[1],
-        per_cell_x=1.0 / grid.cell[0],
-        per_cell_y=1.0 / grid.cell[1],
-        last_row=rows - inside,
-        last_column=columns - inside,
-        columns=columns,
-        first=0.0,
-        top=grid.heights.max(),
-        reach=0.0,
-    )
+    is_stepped = terrain_kind.is_stepped
+    surface_grid = terrain.SurfaceGrid.of(grid.heights, grid.corner, grid.cell, is_stepped)
     return Ground.nowhere()._replace(
         normal=np.array(NormalForce(ground.stiffness, ground.damping)),
         friction=friction.law(),
@@ -133,6 +122,17 @@ def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
     axes[:, 1, 1:] = frames[:, terrain.T2_Y : terrain.T2_Z + 1]
     axes[:, 2] = frames[:, terrain.N_X : terrain.N_Z + 1]
     return axes
+
+
+def foot_gaps(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
+    """Distances (contacts,) in m of feet with the centres p_WN (contacts, 3) from the surface;
+    negative in the ground."""
+    frames = ground_frames(p_WN, ground)
+    frames[:, terrain.GAP] -= ground.radius
+    for i in np.flatnonzero(ground.radius[: len(ground.rolled)]).tolist():
+        grid = terrain.SurfaceGrid(*ground.rolled[i])
+        terrain.put_frame(tuple(p_WN[i]), grid, ground.heights, True, i, frames)
+    return frames[:, terrain.GAP]
 
 
 def ground_frames(p_WN: np.ndarray, ground: Ground) -> np.ndarray:

@@ -145,8 +145,9 @@ class GroundContact(ConvertibleSystem):
         check_type("SetGround", "ground", ground, contact.Ground)
         if ground.friction.kind != self._ground.friction.kind:
             raise InputError("SetGround", "ground", "found another law of friction")
-        # The last number of a grid is the largest radius of a foot.
-        theirs, ours = ((*one.grid[:-1], *one.heights) for one in (ground, self._ground))
+        # The last number of a grid is the largest radius of a foot, and rolled surfaces come last.
+        own = min(ground.heights.size, self._ground.heights.size)
+        theirs, ours = ((*one.grid[:-1], *one.heights[:own]) for one in (ground, self._ground))
         if theirs != ours:
             raise InputError("SetGround", "ground", "found another terrain")
         rows = [

@@ -89,11 +89,13 @@ HELD = {"top": [0.3, 0.0, 0.4], "side": [-0.3, 0.1, 0.1]}
 
 
 def held_robot() -> tuple[Model, np.ndarray, np.ndarray]:
-    """A prism with anchors and cables from fixed nodes, its state at rest and slightly displaced,
-    and no contact modes."""
+    """A prism with anchors, and with cables from fixed nodes and over fixed rings. Its state is at
+    rest and slightly displaced; it has no contact modes."""
     tree = read_structure("prism").model_dump()
     rope = {"pairs": [["top", "n3"], ["side", "n1"], ["side", "n4"]], "stiffness": 10.0}
     tree["cables"]["rope"] = rope | {"damping": 0.7, "free_length": 0.1}
+    over_rings = {"pairs": [["top", "n3", "side", "n4"], ["n0", "top", "n1"]], "damping": 0.9}
+    tree["cables"]["sling"] = tree["cables"]["rope"] | over_rings
     tree["nodes"] |= HELD
     anchors = dict.fromkeys(HELD, "xyz") | {"n0": "xyz", "n2": "yz", "n5": "x"}
     robot = Robot.of(scenario_of(tree | {"anchors": anchors}))

@@ -19,7 +19,7 @@ from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
-from tetra_drake.laws.model import Joints, Model, carriers_of
+from tetra_drake.laws.model import WORLD, Joints, Model, carriers_of
 from tetra_drake.laws.terrain import to_world
 from tetra_drake.laws.vectors import cross, dot, put_vector, vector_at
 
@@ -68,7 +68,8 @@ class Solver(NamedTuple):
     @functools.lru_cache(maxsize=8)  # most robots of a run have the same couplings
     def _of(cls, bodies: int, coupled: BodyPairs, jointed: BodyPairs, on_paths: BodyPairs) -> Self:
         """The solver for the pairs of bodies that straight cables, joints and paths join."""
-        schedule = Schedule.of(bodies, [*coupled, *jointed, *(p for p in on_paths if p[0] < p[1])])
+        moving = [(a, b) for a, b in on_paths if WORLD < a < b]
+        schedule = Schedule.of(bodies, [*coupled, *jointed, *moving])
         blocks = schedule.blocks | {(body, body): body for body in range(bodies)}
         either = {(b, a): block for (a, b), block in blocks.items()} | blocks
         of_pairs = [
