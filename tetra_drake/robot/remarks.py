@@ -10,6 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tetra_drake.errors import InputError
+from tetra_drake.formatting import rounded
 from tetra_drake.laws import cable
 from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.robot import Robot
@@ -125,8 +126,8 @@ def yielding_remark(robot: Robot) -> str:
     is_bound = own == bound < firm
     if way <= (0.1 if is_bound else 1.0) * YIELDS * stretch:
         return ""
-    needed = units.shown(max(firm, own * way / (0.1 * YIELDS * stretch)), "N/m")
-    share = f"{100.0 * way / stretch:.2g} % of" if tension else "without"
+    needed = units.shown(firm if own < firm else own * way / (0.1 * YIELDS * stretch), "N/m")
+    share = f"{rounded(100.0 * way / stretch, 2)} % of the" if tension else "without"
     gives = f"at rest {names[most]} gives way by {units.shown(way, 'm')}, {share} stretch of cables"
     light = ", but with shorter steps" if is_bound else ""
     return f"{gives}; {needed} would hold it{light}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -70,8 +69,8 @@ def form_find(scenario: GivenScenario, prestress: Mapping[str, str]) -> Scenario
 def _check_range(structure: Structure, tensions: Mapping[str, float]) -> None:
     """Refuses tensions (N) of groups that would leave a cable no free length."""
     found = np.array([tensions[group] for group in structure.cable_groups])
-    lengths: Any = structure.initial_lengths
-    most = np.asarray(elastic_tension(lengths, CableLaw.of(structure.cables)))
+    laws = [CableLaw(**law)._replace(free_length=0.0) for law in structure.cable_laws]
+    most = np.array([*map(elastic_tension, structure.initial_lengths.tolist(), laws)])
     worst = (found / most).argmax()
     if found[worst] > most[worst]:
         name, limit = structure.cable_names[worst], f"{most[worst]:.4g} N"
