@@ -5,6 +5,7 @@ import functools
 import json
 import math
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -278,7 +279,7 @@ def test_a_regulator_damps_the_slow_swing_of_a_load_on_a_long_rope():
     long, mass, cost = 150.0, 500.0, 1e-4
     rope = {"stiffness": 1e5, "damping": 100.0, "tension": mass * 9.80665}
     guy = {"stiffness": 1.0, "damping": 0.0, "tension": 1.0}
-    tree = {
+    tree: dict[str, Any] = {
         "nodes": {"hook": [0, 0, long], "load": [0, 0, 0], "x": [60, 0, 0], "y": [0, 60, 0]},
         "masses": {"load": mass},
         "cables": {
@@ -297,6 +298,12 @@ def test_a_regulator_damps_the_slow_swing_of_a_load_on_a_long_rope():
     assert gain[0, [3, 9]] == pytest.approx([k, c], rel=0.01)
     swing = math.sqrt(spring / mass) / math.tau
     assert linear.modes().frequencies[:2] == pytest.approx([swing, swing], rel=0.01)
+    # One guy cannot hold the swing across it.
+    tree["cables"]["guy"] = guy | {"pairs": [["load", "x"]]}
+    tree |= {"anchors": dict.fromkeys(["hook", "x"], "xyz"), "actuated": {"x": ["guy load x"]}}
+    del tree["nodes"]["y"]
+    with pytest.raises(InputError, match="lqr"):
+        linearize(scenario_of(tree)).lqr(np.eye(12), [[cost]])
 
 
 def test_gains_grow_as_the_root_of_a_high_cost():

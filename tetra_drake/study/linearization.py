@@ -122,8 +122,9 @@ class Linearization:
         Raises:
             InputError: if a matrix is wrong, or the signals cannot bring the motions to rest.
         """
-        if not self.inputs:
-            raise InputError(self.robot.scenario.name, "robot.actuated", "has no signals for LQR")
+        if not (self.inputs and self.resisted.size):
+            problem = "has no signals for LQR, or no motions that they could hold"
+            raise InputError(self.robot.scenario.name, "robot.actuated", problem)
         A, B = self.system.A(), self.system.B()
         Q = _checked_cost(state_cost, len(A), "state_cost")
         R = _checked_cost(input_cost, B.shape[1], "input_cost")
@@ -136,7 +137,8 @@ class Linearization:
             raise InputError("lqr", "", f"finds no gain: {error}") from error
         terms = [A.T @ to_go, to_go @ A, -gain.T @ R @ gain, Q]
         is_solved = np.abs(sum(terms)).max() < _SOLVED * np.abs(terms).max()
-        if not (is_solved and (linalg.eigvals(A - B @ gain).real < 0.0).all()):
+        roots = linalg.eigvals(A - B @ gain)
+        if not (is_solved and roots.real.max() < -_ROUNDED * np.abs(roots).max()):
             raise InputError("lqr", "", "finds no gain that brings all motions to rest")
         return np.asarray(gain @ kept.T)
 
