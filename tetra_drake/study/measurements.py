@@ -268,8 +268,9 @@ class MotionCapture(Section):
             share = self.uncertainty / self.marker_offset
             frame, offsets = aligned_with_offsets(p, R, measured, frame, share, is_free=is_free)
             p = p + np.einsum("tnij,nj->tni", R, offsets)
-            beside = zip(names, 1e3 * np.linalg.norm(offsets, axis=1), strict=True)
-            notes += [f"the marker of {x[:-2]} is {mm:.1f} mm beside it" for x, mm in beside]
+            beside = 1e3 * np.linalg.norm(offsets, axis=1)
+            where = names[beside.argmax()][:-2]
+            notes.append(f"markers are beside nodes, at most by {beside.max():.1f} mm at {where}")
         turn, origin = frame
         if is_free:
             place = ", ".join(f"{fixed(1e3 * each, 1)} mm" for each in origin)
