@@ -282,7 +282,7 @@ def test_a_limited_tendon_is_a_stiff_cable(tmp_path: Path) -> None:
 
 def test_anchors_and_loads_come_back(tmp_path: Path) -> None:
     changes = {"friction.stiffness": "0 N/m", "engine": "!Mujoco"}
-    scenario = supported_prism(**changes)
+    scenario = supported_prism(**changes, robot__anchor_stiffness="3e5 N/m")
     (tmp_path / "a.xml").write_text(make_mjcf(Robot.of(scenario, at_rest=True)))
     structure, given = read_structure(tmp_path / "a.xml"), scenario.robot
     assert [structure.anchors, structure.loads] == [given.anchors, given.loads]

@@ -66,7 +66,9 @@ def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
 
 
 def test_springs_and_dampers_of_nodes_add_to_anchors() -> None:
-    given = structure("{anchors: {a: x}, springs: {a: 2 N/m}, dampers: {g: 4 N*s/m}}")
+    given = structure(
+        "{anchors: {a: x}, anchor_stiffness: 1e5 N/m, springs: {a: 2 N/m}, dampers: {g: 4 N*s/m}}"
+    )
     blueprint = given.blueprint()
     a, g = blueprint.node_names.index("a"), blueprint.node_names.index("g")
     assert blueprint.anchor_stiffness[[a, g]].tolist() == [[1e5 + 2, 2, 2], [0, 0, 0]]

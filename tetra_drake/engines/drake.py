@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
+import math
 import weakref
 from collections.abc import Mapping
 from time import perf_counter
@@ -68,6 +69,9 @@ _FEW, _RATE_PER_SQUARE = 12, 14.0
 second one, both schemes take equally long for rows of 25 tetrahedra."""
 _FINEST = 2e-5
 """Smallest default of the target accuracy; see MakeSimulator()."""
+_RENEWAL = 20
+"""Most steps with one Jacobian of a robot with anchors or joints, whose stiff springs turn with its
+bodies."""
 _WORK = ("steps", "derivative_evaluations", "jacobian_evaluations")
 """Counts of the integrator's work; fields of IntegratorWork."""
 
@@ -347,6 +351,8 @@ class _Steps:
     at_step_end: bool
     """True if modes change at the end of steps."""
     pace: _Pace
+    renewal: float
+    """Most steps with one Jacobian."""
 
     @classmethod
     def of(cls, robot: Robot, settings: Drake) -> _Steps:
@@ -355,11 +361,13 @@ class _Steps:
         accuracy = min(pace.coarsest, max(_FINEST, 0.5 * robot.damping_ratio))
         longest = settings.max_step or min(pace.max_step, robot.longest_step)
         given = {"max_step": longest, "look_ahead": settings.look_ahead}
+        is_held = robot.model.anchors.nodes.size + robot.model.joints.node_a.size > 0
         return cls(
             scheme=settings.scheme or default_scheme(robot),
             accuracy=settings.accuracy or accuracy,
             at_step_end=settings.mode_changes == "step_end",
             pace=pace._replace(**{key: x for key, x in given.items() if x is not None}),
+            renewal=_RENEWAL if is_held else math.inf,
         )
 
 
@@ -435,7 +443,7 @@ class _StepAimer:
 
     A mode change also changes the Jacobian. The integrator would keep the old one as long as
     Newton's iterations converge, slowly and with an error of one sign. So we renew the Jacobian,
-    unless the next step is shorter than `renew_from`.
+    unless the next step is shorter than `renew_from`. It is also renewed after `renewal` steps.
 
     All this is for the scheme radau3 with `mode_changes: step_end`. With any scheme, struts
     that approach limit the step, so that they cannot pass through each other.
@@ -443,6 +451,7 @@ class _StepAimer:
 
     def __init__(self, diagram: Diagram, simulator: Simulator, steps: _Steps, work: _Work) -> None:
         self._pace, self._work, self._state = steps.pace, work, diagram.GetOutputPort("state")
+        self._renewal, self._age = steps.renewal, 0  # steps
         self._ground = diagram.GetSubsystemByName("ground")
         self._aims = (
             steps.at_step_end
@@ -461,14 +470,14 @@ class _StepAimer:
     def numbers(self) -> np.ndarray:
         """The state of the aimer as one array, for restore()."""
         longest = self._work.integrator.get_maximum_step_size()
-        own = [self._last_time, self._longest, float(self._jacobian_is_old), longest]
+        own = [self._last_time, self._longest, float(self._jacobian_is_old), longest, self._age]
         return np.concatenate([own, self._last_velocities, self._acceleration])
 
     def restore(self, numbers: np.ndarray) -> None:
         """Puts the aimer into a state of numbers()."""
-        self._last_time, self._longest, is_old, longest = numbers[:4].tolist()
+        self._last_time, self._longest, is_old, longest, self._age = numbers[:5].tolist()
         self._jacobian_is_old = bool(is_old)
-        self._last_velocities, self._acceleration = np.split(numbers[4:].copy(), 2)
+        self._last_velocities, self._acceleration = np.split(numbers[5:].copy(), 2)
         self._work.integrator.set_maximum_step_size(longest)
         self._work.integrator.request_initial_step_size_target(longest)  # for Initialize()
 
@@ -504,12 +513,13 @@ class _StepAimer:
             margin = min(_AIM_BEYOND, 0.25 * pace.look_ahead)
             aimed = max(pace.look_ahead, _AIM_FACTOR * time_to_change + margin)
         step = min(longest, self._longest, aimed)
-        if self._jacobian_is_old and step >= pace.renew_from:
+        self._age += 1
+        if self._age >= self._renewal or (self._jacobian_is_old and step >= pace.renew_from):
             self._work.before = self._work.total()
             # Initialize() needs a limit that allows the initial step, which is the longest.
             integrator.set_maximum_step_size(pace.max_step)
             integrator.Initialize()
-            self._jacobian_is_old = False
+            self._jacobian_is_old, self._age = False, 0
         integrator.set_maximum_step_size(step)
 
 

@@ -258,7 +258,7 @@ class StructureFile(RobotSettings):
     """Nodes at which struts of several bodies are held together by ball joints. Without, struts
     that share a node are one body. The first strut's body has the node; each other body has a copy
     of it, such as n-2 and n-3 for n, and a joint with the same name."""
-    joint_stiffness: Stiffness | None = Field(default=None, gt=0)
+    joint_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
     """Stiffness of pinned nodes, and of joints that give none. The default is the same as for
     anchors."""
     bodies: Keyed[Name, JoinedBody] = Field(default={})
@@ -283,7 +283,7 @@ class StructureFile(RobotSettings):
     anchors: Keyed[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
-    anchor_stiffness: Stiffness | None = Field(default=None, gt=0)
+    anchor_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
     """Stiffness that holds a node of a strut along each axis of its anchor. By default it is 1000
     times the stiffness of all cables, and at least so great that the robot's weight moves the node
     by a hundredth of a millimetre per metre of the robot's length. It is no greater than 1e8 / s²

@@ -186,4 +186,4 @@ def test_the_implicit_matrix_has_the_stiffness_of_anchors():
     without = robot._replace(anchors=anchors._replace(damping=anchors.stiffness))
     others, _ = damping_and_stiffness(without, state, modes)
     np.testing.assert_allclose(1e-3 * stiffness, damping - others, atol=1e-4)
-    assert stiffness.max() == pytest.approx(1e5)
+    assert stiffness.max() == pytest.approx(robot.anchors.stiffness.max())
