@@ -158,7 +158,7 @@ def totals_table(rows: pandas.DataFrame, by: str) -> TextTable:
 
 
 def blind_table(blind: pandas.DataFrame, anew: pandas.DataFrame) -> TextTable:
-    """Scores of the blind predictions as they were committed, and of those made anew."""
+    """Scores of the blind predictions as they were committed, and of predictions made anew."""
     lines = []
     for (structure, kind), rows in blind.groupby(["structure", "kind"], sort=False):
         again = anew[(anew["structure"] == structure) & (anew["kind"] == kind)]
