@@ -102,7 +102,10 @@ _SHORT, _SETTLED = _by(CmaEs(), 3, 2000), _by(CmaEs(), 10, 2000)
 _APART = {"require": {"clearance": "8 mm", "tension": 0.0}}
 """Requirements: struts do not touch, 8 mm being the thickest's diameter, and cables never push."""
 
-_STRUCTURE = _by(CmaEs(), 3, 1500) | {"simulation.duration": "15 s"} | _APART
+_FORMER = {"robot.anchor_stiffness": "100 kN/m"}
+"""A former default in the records of structures, which have no anchors."""
+
+_STRUCTURE = _by(CmaEs(), 3, 1500) | {"simulation.duration": "15 s"} | _APART | _FORMER
 
 _BODY = {
     "evolve": {
@@ -124,7 +127,7 @@ EXPERIMENTS = {
     "rolling": Experiment(
         "a rover of six struts rolls by a feedback policy, in 10 s",
         "rolling",
-        {"simulation.steady_from": "2 s"},
+        {"simulation.steady_from": "2 s"} | _FORMER,
         film=True,
     ),
     "thesis": Experiment("the thesis's experiment, ten trials", "thesis", {}),
@@ -194,12 +197,12 @@ EXPERIMENTS = {
     "co-evolution": Experiment(
         "a prism whose body evolves with its gait, in 8 s, ten trials",
         "prism",
-        _by(CmaEs(), 10, 600) | _APART | _BODY,
+        _by(CmaEs(), 10, 600) | _APART | _BODY | _FORMER,
     ),
     "co-evolution-gait": Experiment(
         "the same prism as it is, its gait alone, in 8 s, ten trials",
         "prism",
-        _by(CmaEs(), 10, 600) | _APART,
+        _by(CmaEs(), 10, 600) | _APART | _FORMER,
     ),
     "six-bar": Experiment("a six-bar tensegrity", "six_bar", _STRUCTURE, film=True),
     "mast": Experiment("a mast of four vertebrae, lying", "mast", _STRUCTURE, film=True),
