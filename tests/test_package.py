@@ -76,7 +76,7 @@ def test_links_and_pictures_survive_on_an_index_of_packages(readme):
     address = "https://code.example/someone/tetra_drake"
     text = readme.for_index(read("README.md"), address, "1.2.3")
     assert all(target.startswith("https://") for target in targets(text))
-    assert f'<img src="{address}/raw/v1.2.3/runs/champion/walking.gif" width="430" alt="' in text
+    assert f'<img src="{address}/raw/v1.2.3/runs/champion/walking.gif" width="380" alt="' in text
     assert (
         f"]({address}/blob/v1.2.3/tetra_drake/scenario/README.md#a-structure-of-your-own)" in text
     )

@@ -94,7 +94,7 @@ def test_what_a_tutorial_imports_is_there_and_so_is_its_picture(name):
             assert hasattr(tetra_drake, node.attr), node.attr
 
 
-SLOW = ("05", "06", "07", "09", "10", "11", "15", "16", "17", "22", "23", "24")
+SLOW = ("05", "06", "07", "09", "10", "11", "15", "16", "17", "18", "22", "23", "24")
 
 
 @pytest.mark.parametrize(

@@ -179,6 +179,7 @@ def test_the_jumpers_heights_are_from_its_lowest_node():
     assert 0.0 < found["height 2"] < found["height 3"] < 6.0 < 150.0 < found["height 4"]
 
 
+@pytest.mark.slow
 def test_bowed_tubes_lower_the_simplex_under_a_high_load_only():
     loads = [float(load) for load in LOADS]
     case = measured_intervals.simplex_loads_case(1.5, loads, means=True)

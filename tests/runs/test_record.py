@@ -34,6 +34,7 @@ def analysed(monkeypatch):
     return analysed
 
 
+@pytest.mark.slow
 def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed):
     scratch, out = tmp_path / "scratch", tmp_path / "runs"
     (out / "tiny/trial_07").mkdir(parents=True)  # of an older run
