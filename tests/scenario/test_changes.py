@@ -157,6 +157,7 @@ NOT_REMOVED |= {
 NOT_REMOVED |= {"ground: {stiffness: null}": "ground.stiffness", "name: null": "name"}
 NOT_REMOVED |= {"robot: {cables: {guy: {stiffness: null}}}": "robot.cables.guy.stiffness"}
 NOT_REMOVED |= {"objective: {lead: null}": "objective.lead"}
+NOT_REMOVED |= {"ground: {stiffness: {soft: null}}": "ground.stiffness"}
 
 
 @pytest.mark.parametrize("text", NOT_REMOVED)

@@ -52,8 +52,8 @@ def merged(base: Any, changes: Any, key: str = "", *, section: Any = None) -> An
                 raise InputError("changes", inner, f"found no such item in a list of {len(items)}")
             items[index] = merged(items[index], value, inner)
         return items
-    parts = {} if TAG in changes else getattr(section, "__dict__", section or {})
-    named = parts if parts is section else {}  # the names of a map, which are no keys of a section
+    named = section if isinstance(section, dict) and TAG not in changes else {}  # names of a map
+    parts = named or ({} if TAG in changes else getattr(section, "__dict__", {}))
     removed = [name for name, value in changes.items() if value is None and name in named]
     is_whole = TAG in changes or (key in REPLACED and not (removed or isinstance(changes, Part)))
     tree = dict(base) if isinstance(base, dict) and not is_whole else {}
