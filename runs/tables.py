@@ -165,11 +165,9 @@ def best_gait(name: str, run: Analysis) -> Best:
     by_engine = dict(zip(ENGINES, reached, strict=True))
     gait, draws = run.best_gaits.loc[trial], run.disturbed.loc[trial]
     changed = INCH * gait["sensitivity_in"]
-    known = [*reached, reached[0] - changed, reached[0] + changed]
-    if not isinstance(scenario.friction, Coulomb):
-        known.remove(by_engine["MuJoCo"])  # whose law is another one
-    if not turns:
-        known += draws[list(DRAWN)].tolist()
+    # MuJoCo has Coulomb friction; under another law its distance is not one of this gait.
+    alike = reached if isinstance(scenario.friction, Coulomb) else reached[:2]
+    known = [*alike, reached[0] - changed, reached[0] + changed, *draws[list(DRAWN)]]
     return Best(
         title,
         f"{DIAGRAM}.svg",
@@ -178,7 +176,7 @@ def best_gait(name: str, run: Analysis) -> Best:
         scenario.units,
         turns,
         relative_speed=math.nan if turns else gait[SPEED],
-        known=(np.nanmin(known), np.nanmax(known)),
+        known=(math.nan, math.nan) if turns else (np.nanmin(known), np.nanmax(known)),
     )
 
 

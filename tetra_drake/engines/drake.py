@@ -360,13 +360,15 @@ class _Steps:
         pace = _VISCOUS if robot.scenario.friction.is_viscous else _SLIPPING
         accuracy = min(pace.coarsest, max(_FINEST, 0.5 * robot.damping_ratio))
         longest = settings.max_step or min(pace.max_step, robot.longest_step)
-        given = {"max_step": longest, "look_ahead": settings.look_ahead}
+        pace = pace._replace(max_step=longest)
+        if settings.look_ahead is not None:
+            pace = pace._replace(look_ahead=settings.look_ahead)
         is_held = robot.model.anchors.nodes.size + robot.model.joints.node_a.size > 0
         return cls(
             scheme=settings.scheme or default_scheme(robot),
             accuracy=settings.accuracy or accuracy,
             at_step_end=settings.mode_changes == "step_end",
-            pace=pace._replace(**{key: x for key, x in given.items() if x is not None}),
+            pace=pace,
             renewal=_RENEWAL if is_held else math.inf,
         )
 

@@ -148,12 +148,11 @@ def actuator_loads(result: SimulationResult) -> Loads:
         load, left = tension - beside, actuator.wound(constants, drives, length)
         rate = actuator.wound(constants, drive_rate, rate)
 
-    settling_time, start_up = robot.scenario.simulation.settling_time, robot.scenario.cpg.start_up
-    power, steady = -load * rate, trajectory.time.values >= max(settling_time, start_up)
+    assert result.tally  # the result is from a simulation
+    effort, begins = result.tally.effort, result.tally.begins[0]
+    power, steady = -load * rate, trajectory.time.values >= begins
     # Means of tables are NaN without samples: a simulation may end before its steady stretch.
     work, time = (pandas.DataFrame(x[steady]) for x in (np.maximum(power, 0.0), limited))
-    assert result.tally  # the result is from a simulation
-    effort = result.tally.effort
     columns = {
         "peak_force_N": effort.peak_force[robot.driven],
         "limit_of_force_N": limits.max_force,

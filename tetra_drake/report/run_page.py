@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 
 import pandas
 
-from tetra_drake import systems
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, BEST_SCENARIO, trial_folder
@@ -60,7 +59,7 @@ _LONGEST_SETTING = 60  # letters; longer settings are not shown
 _MOST_PARAMETERS = 40  # of a policy; further ones are not shown
 RECORDED_GAIT, RECORDED = Path(__file__).with_name("thesis_gait.json"), "recorded.html"
 """The best recorded gait of the thesis's robot, and the name of its replay page."""
-BLOCK_DIAGRAM = Path(systems.__file__).with_name("robot.svg")
+BLOCK_DIAGRAM = Path(__file__).parents[1] / "systems/robot.svg"
 """Block diagram of the thesis's robot, as Graphviz draws it."""
 _NOT_OF_THE_ROBOT = ("engine", "evolution.", "optimizer", "simulation.")
 # Settings that are not shown among those that differ from the thesis's; some are elsewhere.
@@ -299,12 +298,13 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
     if scenario.disturbances:
         alone = headline(scenario, vars(best.result.metrics))
         words = f"{alone}; mean of {scenario.draw_count} draws: {words}"
+    assert best.result.tally  # the result is from a simulation
     return render(
         "report/report.html.jinja",
         shown=shown,
         title=f"{scenario.name}: {words}",
         spread=spread,
-        steady=max(scenario.simulation.settling_time, scenario.cpg.start_up),
+        steady=best.result.tally.begins[0],
         still=stillness_remark(best.result.robot, best.recorded),
         pictures={
             part: [_embedded(picture, folder) for picture in drawn]

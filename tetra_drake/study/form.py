@@ -58,9 +58,9 @@ def form_find(scenario: GivenScenario, prestress: Mapping[str, str]) -> Scenario
         wanted[group] = given_quantity(str(given), "N", _SOURCE, f"prestress.{group}")
     structure = Structure.of(robot.blueprint())
     changes: dict[str, str | None] = {}
-    tensions = _tensions(structure, groups, wanted)
-    _check_range(structure, dict(zip(groups, tensions, strict=True)))
-    for group, tension in zip(groups, tensions, strict=True):
+    tensions = dict(zip(groups, _tensions(structure, groups, wanted), strict=True))
+    _check_range(structure, tensions)
+    for group, tension in tensions.items():
         changes[f"robot.cables.{group}.tension"] = f"{tension!r} N"
         changes[f"robot.cables.{group}.free_length"] = None
     return scenario.with_changes(changes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 import time
@@ -108,7 +109,7 @@ class Predictions:
             f"{self.wall_time:.1f} s."
         )
 
-    @property
+    @functools.cached_property
     def notes(self) -> list[str]:
         """How many draws lack a quantity, with a reason, whether shares are missing, and what gives
         way at rest."""
