@@ -27,7 +27,6 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from records import append, read
 
-from tetra_drake.engines.planner import Planner
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
@@ -36,6 +35,7 @@ from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.lab.planner import Planner
 from tetra_drake.machine import available_cores
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation

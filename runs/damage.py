@@ -24,12 +24,12 @@ import pandas
 from matplotlib.figure import Figure
 from records import append, read
 
-from tetra_drake.engines.planner import Planner
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.style import OKABE_ITO, common_style, save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import TextTable, fixed
+from tetra_drake.lab.planner import Planner
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, network_gait
 from tetra_drake.robot.network import Weights

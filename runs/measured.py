@@ -36,8 +36,8 @@ from measured_robots import (
 from tetra_drake.figures.style import LINE_COLOURS, common_style, line_style, save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import TextTable, fixed
-from tetra_drake.study.fit import Fit
-from tetra_drake.study.predict import interval_text
+from tetra_drake.lab.fit.fit import Fit
+from tetra_drake.lab.predict.predict import interval_text
 
 # Tables, pictures and the page
 

@@ -36,6 +36,7 @@ from scipy.optimize import brentq, linear_sum_assignment
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_json, write_whole
+from tetra_drake.lab.predict.predict import drawn_scenarios, errors_of, intervals
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
@@ -44,7 +45,6 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.tolerances import Variate, variates_of
 from tetra_drake.study.equilibrium import study_equilibrium
-from tetra_drake.study.predict import drawn_scenarios, errors_of, intervals
 
 KEPT = HERE / "predictions"
 """Folder of the finished cases. A case whose file is there is not computed again."""

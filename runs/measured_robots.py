@@ -10,6 +10,8 @@ import numpy as np
 import pandas
 
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.lab.fit.fit import Fit, fit_values
+from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.equilibrium import Unactuated
@@ -22,8 +24,6 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.tolerances import Tolerance, variates_of
 from tetra_drake.settings.section import value_at
 from tetra_drake.study.equilibrium import study_equilibrium
-from tetra_drake.study.fit import Fit, fit_values
-from tetra_drake.study.measurements import Rest
 
 HERE = Path(__file__).parent / "measured"
 

@@ -31,7 +31,6 @@ from record import load_times
 from records import append, read
 from scipy.ndimage import map_coordinates
 
-from tetra_drake.engines.planner import Planner
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.evolution.manifest import MANIFEST
@@ -39,10 +38,11 @@ from tetra_drake.experiment import evolve
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import TextTable, fixed, listed
-from tetra_drake.prototype.command_file import load_command
-from tetra_drake.prototype.export import COMMAND, export
+from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.prototype.export import COMMAND, export
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
+from tetra_drake.robot.command_file import load_command
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario

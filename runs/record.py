@@ -36,13 +36,13 @@ from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration, listed
+from tetra_drake.lab.elites.elites import judge_elites
+from tetra_drake.lab.prototype.export import export
 from tetra_drake.machine import available_cores
-from tetra_drake.prototype.export import export
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, OptimizerKind, QualityDiversity
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.study.elites import judge_elites
 
 HERE = Path(__file__).parent
 SCRATCH = Path("out/runs")

@@ -36,9 +36,9 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.reevaluation import BEST_GAITS
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import write_whole
+from tetra_drake.lab.elites.elites import elites
 from tetra_drake.scenario.load import SCENARIO
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.study.elites import elites
 
 _DIGITS, _WALL_TIME_DIGITS = 3, 2
 """Significant digits of the numbers of an evaluation without genome, and of all wall times."""

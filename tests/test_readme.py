@@ -16,9 +16,10 @@ from tables import aspect
 
 import tetra_drake as td
 from tetra_drake.cli import main, make_parser
+from tetra_drake.lab.bridges.conversion import converted
+from tetra_drake.lab.fit.measurements import load_fit_file
 from tetra_drake.robot.robot import equilibrium_of
 from tetra_drake.scenario.structure_files import read_structure
-from tetra_drake.study.measurements import load_fit_file
 from tetra_drake.systems import MatsuokaCpg
 
 CHECKOUT = Path(__file__).parents[1]
@@ -70,11 +71,11 @@ def test_the_plugin_of_the_page_is_the_example() -> None:
 
 def test_the_files_of_other_kinds_are_read(work: Path) -> None:
     texts = snippets("yaml", SCENARIOS)
-    [tower] = [text for text in texts if "pair_groups:" in text]
+    [tower] = snippets("yaml", (CHECKOUT / "tetra_drake/lab/README.md").read_text("utf-8"))
     [fit] = [text for text in texts if "measurements:" in text]
     (work / "tower.yaml").write_text(tower)
     (work / "fit.yaml").write_text(fit)
-    structure = read_structure("tower.yaml", unit="dm")
+    structure = converted(Path("tower.yaml"), unit="dm")
     assert structure.nodes["f"] == pytest.approx([0.5, 0.0, 1.0])
     assert len(structure.struts["rod"].pairs) == 3
     capture, rest = load_fit_file("fit.yaml").measurements

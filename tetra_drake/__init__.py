@@ -51,10 +51,11 @@ names and their modules are in `__init__.pyi`, which type checkers read, too.
 
 from __future__ import annotations
 
-import importlib
 import re
 from pathlib import Path
 from typing import Any
+
+from tetra_drake.on_demand import loaded
 
 __version__ = "0.5.0"
 
@@ -67,7 +68,7 @@ __all__ = ["__version__", *_MODULES]
 def __getattr__(name: str) -> Any:
     if name not in _MODULES:
         raise AttributeError(f"module 'tetra_drake' has no attribute '{name}'")
-    return getattr(importlib.import_module(_MODULES[name]), name)
+    return loaded(f"{_MODULES[name]}:{name}")
 
 
 def __dir__() -> list[str]:

@@ -42,7 +42,7 @@ def run(prism, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tetra_drake.report.run_page.draw_pictures", quick_figures.draw_none)
         patch.setattr("tetra_drake.evolution.reevaluation.BEST_GAITS", 2)
-        patch.setattr("tetra_drake.study.spread.record_spread", lambda *_, **__: None)
+        patch.setattr("tetra_drake.lab.spread.record_spread", lambda *_, **__: None)
         out = tmp_path_factory.mktemp("run") / "it"
         return evolve(prism, out, executor=ThreadPoolExecutor, workers=1)
 

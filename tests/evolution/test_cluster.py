@@ -159,7 +159,7 @@ def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(
     for module in ("experiment", "evolution.reevaluation"):
         monkeypatch.setattr(f"tetra_drake.{module}.evaluator_of", evaluator_of)
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
-    monkeypatch.setattr("tetra_drake.study.spread.record_spread", lambda *_, **__: None)
+    monkeypatch.setattr("tetra_drake.lab.spread.record_spread", lambda *_, **__: None)
     command = ["evolve", "--scenario", "quick", "--evaluations", "16", "--workers", "1"]
     for name, executor in (("dask", ("--dask",)), ("local", ())):
         assert cli.main([*command, "--out", str(tmp_path / name), *executor]) == 0

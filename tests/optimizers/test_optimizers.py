@@ -10,7 +10,8 @@ import pytest
 from helpers.analytic import measures, optimise, small_scenario
 from threadpoolctl import threadpool_limits
 
-from tetra_drake.optimizers import cma_es, optimizer_of, quality_diversity
+from tetra_drake.lab.elites import quality_diversity
+from tetra_drake.optimizers import cma_es, optimizer_of
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import TAU_A, TAU_B, ParameterSpace
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState

@@ -7,8 +7,8 @@ from helpers.brief import BRIEF
 from helpers.meshcat_page import read_page
 
 from tetra_drake.evolution.run import load_run
+from tetra_drake.lab.elites.elites import elites
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.study.elites import elites
 
 MAP = QualityDiversity(cells=[2, 2], draws=1)
 FEW = {"robot.tetrahedra": 2, "optimizer": MAP, "evolution.trials": 2, "evolution.evaluations": 8}

@@ -15,13 +15,13 @@ from helpers.recorded import recorded_run
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import read_manifest
+from tetra_drake.lab.elites.elites import elites
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.robot.gait import ParameterSpace, load_gait
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.settings.units import INCH
-from tetra_drake.study.elites import elites
 from tetra_drake.study.robustness import DRAWS
 
 DRAKE = "`!Drake {}`"

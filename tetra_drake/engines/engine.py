@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import importlib
 from collections.abc import Sequence
 from typing import ClassVar
 
 from tetra_drake.engines.batch import Batch, LoneRobot, SerialBatch, Viewer
 from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.on_demand import loaded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import driven_robot
 from tetra_drake.robot.gait import seeded_gait
@@ -86,7 +86,7 @@ class Engine:
 
 def engine_of(scenario: Scenario) -> Engine:
     """Engine that the scenario's setting `engine` names. Its module is imported on demand."""
-    engine: Engine = importlib.import_module(scenario.engine.module).ENGINE
+    engine: Engine = loaded(f"{scenario.engine.module}:ENGINE")
     return engine
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -153,7 +154,7 @@ class Run:
 
     def spread_of(self, gait: pandas.Series) -> MetricRanges:
         """Recorded ranges of the metrics of a gait, a row of `evaluations`, for moved starts; see
-        study.spread. Empty if there are none."""
+        lab.spread. Empty if there are none."""
         for line in self.file(SPREADS).read():
             if (line.trial, line.index) == (gait["trial"], gait["index"]):
                 return dict(line.spread)
@@ -354,3 +355,12 @@ def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent
         made = f"made for scenario {best.scenario}"
         warn(f"{source}: {made}, simulated on scenario {chosen.name}")
     return GaitSource(chosen, best, gaits, spread)
+
+
+def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:
+    """Gaits without repetitions: a list of pairs, the names of a gait and its row of
+    Run.evaluations. `named` has such a row by name; a gait may have several names."""
+    names: dict[Any, list[str]] = {}
+    for name, gait in named.items():
+        names.setdefault((gait["trial"], gait["index"]), []).append(name)
+    return [(alike, named[alike[0]]) for alike in names.values()]

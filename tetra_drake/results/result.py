@@ -18,6 +18,7 @@ from tetra_drake import __version__
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Say, fixed, heading_html, silent, uncertain
 from tetra_drake.laws.tally import Tally
+from tetra_drake.on_demand import loaded
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import AnyGait
 from tetra_drake.robot.measures import PERIOD, CentrePath, follow
@@ -154,9 +155,8 @@ class SimulationResult:
         say: Say = silent,
     ) -> None:
         """Writes a video of the motion to the file `path`, an MP4 or a GIF. For the arguments and
-        errors, see visualization.video.make_video()."""
-        from tetra_drake.visualization.video import make_video
-
+        errors, see lab.films.video.make_video()."""
+        make_video = loaded("tetra_drake.lab.films.video:make_video")
         page = self.replay_page()
         make_video(page, Path(path), size=size, fps=fps, view=view, speed=speed, say=say)
 

@@ -269,7 +269,7 @@ def inverse(unit: str) -> str:
 
 MetricRanges = Mapping[str, Sequence[float]]
 """Least and greatest value of each metric, by name, in SI units, if the start moves by 1 nm to 100
-nm; see study.spread. Empty if it is unknown."""
+nm; see lab.spread. Empty if it is unknown."""
 
 MOVED = "under starts moved by 1e-7 m"
 """Words for the range of a number in a MetricRanges."""

@@ -20,6 +20,13 @@ class OptimizerSettings(Section):
     module: ClassVar[str] = "tetra_drake.optimizers"
     """Module of the optimiser: a class that has the name of the kind and "Optimizer", such as
     CmaEsOptimizer. It takes the arguments of optimizers.base.MakeOptimizer, and `settings`."""
+    package: ClassVar[str] = ""
+    """Package that only this optimiser needs."""
+    extra: ClassVar[str] = ""
+    """Extra of this project that installs the package."""
+    map: ClassVar[str] = ""
+    """Module with judge_elites(), elites(), notable_gaits() and map_of_gaits() of the map that the
+    optimiser fills; empty without map."""
 
 
 class SteadyState(OptimizerSettings):
@@ -83,6 +90,10 @@ class QualityDiversity(OptimizerSettings):
     arXiv 2205.10752). Each cell has a level of fitness, which slowly follows its fittest gait.
     Several runs of CMA-ES look for gaits above the level of their cell.
     """
+
+    module: ClassVar[str] = "tetra_drake.lab.elites.quality_diversity"
+    package, extra = "ribs", "qd"
+    map: ClassVar[str] = "tetra_drake.lab.elites.elites"
 
     measures: Annotated[
         dict[str, list[float]],

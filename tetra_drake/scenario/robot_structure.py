@@ -238,10 +238,7 @@ class StructureFile(RobotSettings):
     """A tensegrity: nodes, struts, cables and the oscillators that actuate cables."""
 
     tag: ClassVar[str] = "Structure"
-    keys_of_files: ClassVar = {
-        "file": "Name or file of a structure; the other keys change it.",
-        "without": "Names of bodies of a file of MuJoCo that are left out, separated by commas.",
-    }
+    keys_of_files: ClassVar = {"file": "Name or file of a structure; the other keys change it."}
 
     format: Literal[1] = Field(default=1, exclude=True)
     """Version of the format of the file."""
