@@ -20,9 +20,10 @@ from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.feedback import Gains
 from tetra_drake.robot.network import NEURONS, Weights
-from tetra_drake.scenario.common_sections import separate
+from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 from tetra_drake.settings.quantities import Quantity
 from tetra_drake.settings.section import Section, written
 from tetra_drake.settings.units import given_quantity
@@ -559,7 +560,7 @@ def given_gait(gait: GivenGait, scenario: Scenario) -> AnyGait:
 
 
 def check_gait(
-    gait: Gait, scenario: Scenario, weights: Weights, *, source: object, key: str = ""
+    gait: Gait, scenario: World, weights: Weights, *, source: object, key: str = ""
 ) -> None:
     """Raises InputError, naming source and key, if a gait does not fit the scenario.
 

@@ -13,7 +13,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.laws.oscillator import CpgSection
 from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 
 NEURONS = "extensor", "flexor"
 """Kinds of neurons, by index modulo 2."""
@@ -36,7 +36,7 @@ class Weights:
     oscillators that share a body; None for no limit."""
 
     @classmethod
-    def of(cls, scenario: Scenario) -> Self:
+    def of(cls, scenario: World) -> Self:
         """The connections of a scenario's oscillators."""
         return cls(scenario.robot.blueprint(), scenario.cpg.reach)
 
