@@ -180,7 +180,7 @@ EXPERIMENTS = {
         "robust",
         _by(CmaEs(), 3, 1000) | _SLIPPING,
     ),
-    "efficient": Experiment("with little work, where nodes slip", "efficient", _SHORT | _SLIPPING),
+    "efficient": Experiment("with little work", "efficient", _SHORT),
     "twelve": Experiment(
         "twelve tetrahedra",
         "coulomb",
