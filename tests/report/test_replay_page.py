@@ -78,7 +78,7 @@ def test_an_unfitting_trajectory_is_refused(folder, result, key, change, refused
 DAMAGES = {
     "duration_s": lambda content: content.update(duration_s=0.0),
     "metrics.speed": lambda content: content["metrics"].pop("speed"),
-    "gait.weights": lambda content: content["gait"]["weights"].pop("2->1 flexor"),
+    "gait.parameters": lambda content: content["gait"]["parameters"].pop("tau_A"),
     "integrator.steps": lambda content: content["integrator"].pop("steps"),
     "path.x_m": lambda content: content["path"]["x_m"].pop(),
 }

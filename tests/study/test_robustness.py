@@ -178,5 +178,5 @@ def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement
 
 
 def test_a_gait_of_another_robot_is_refused(scenario, refused):
-    with refused("gait random gait 1", "weights", "expected 4"):
+    with refused("gait random gait 1", "parameters", "expected the 6"):
         robustness.robustness(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)

@@ -120,8 +120,8 @@ class _DiagramRobot(LoneRobot):
         self.driven, self._record, self._viewer = driven, record, viewer
         self.first = driven
         robot, engine = driven.robot, driven.robot.scenario.settings_of(Drake)
-        if driven.gait is not None:
-            diagram = MakeTensegrityDiagram(robot, driven.gait, steering=driven.steering)
+        if (gait := driven.oscillating) is not None:
+            diagram = MakeTensegrityDiagram(robot, gait, steering=driven.steering)
         else:
             diagram = MakeTensegrityDiagram(robot, controller=HeldSignals(robot))
         self._diagram, self._steps = diagram, _Steps.of(robot, engine)

@@ -22,7 +22,7 @@ from tetra_drake.laws.actuator import Actuation, Force
 from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
-from tetra_drake.laws.oscillator import CpgSection
+from tetra_drake.laws.oscillator import CpgSection, GaitBounds, GaitParameter
 from tetra_drake.laws.terrain import Flat, Terrain
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.changes import merged, tree_of_changes
@@ -31,7 +31,6 @@ from tetra_drake.scenario.common_sections import (
     BodyBounds,
     Disturbances,
     EvolutionSection,
-    GaitBounds,
     SimulationSection,
     different_keys,
     separate,
@@ -40,7 +39,7 @@ from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoc
 from tetra_drake.scenario.events import Event, check_taken, up_to_each
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
-from tetra_drake.scenario.policies import Policy, PolicyBounds
+from tetra_drake.scenario.policies import Policy
 from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.tolerances import (
@@ -246,10 +245,14 @@ class Scenario(Section):
         return self.disturbances.draws if self.disturbances else 1
 
     @functools.cached_property
-    def policy_parameters(self) -> Mapping[str, PolicyBounds]:
-        """Names of the parameters of the scenario's policy, with their bounds in random policies;
-        empty without a policy."""
-        return {} if self.policy is None else self.policy.parameters(self.blueprint())
+    def parameters(self) -> Mapping[str, GaitParameter]:
+        """Parameters of a gait by name: of the policy if there is one, otherwise of the
+        oscillators."""
+        blueprint = self.blueprint()
+        if self.policy is None:
+            return self.cpg.parameters(blueprint, self.gait_bounds)
+        bounds = self.policy.parameters(blueprint)
+        return {name: GaitParameter(*pair) for name, pair in bounds.items()}
 
     def blueprint(self) -> Blueprint:
         """The blueprint of the robot, without contact nodes if there is no ground."""
