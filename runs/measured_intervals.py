@@ -37,13 +37,13 @@ from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_json, write_whole
 from tetra_drake.lab.predict.predict import drawn_scenarios, errors_of, intervals
+from tetra_drake.lab.predict.variates import Variate, variates_of
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.struts import axial_forces
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.tolerances import Variate, variates_of
+from tetra_drake.scenario.scenario import Scenario, scenario_of
 from tetra_drake.study.equilibrium import study_equilibrium
 
 KEPT = HERE / "predictions"
@@ -396,7 +396,7 @@ def simplex_frequencies(
         structure = structure_of(scenario)
         bars = [(mode[a], mode[b]) for a, b in structure.struts["tube"].pairs]
         ropes = [tuple(map(mode.__getitem__, cable.split()[1:])) for cable in study.cables.index]
-        masses = structure_of(study.robot.scenario).masses
+        masses = structure_of(scenario_of(study.robot.scenario)).masses
         moving = sum(masses[node] * mode[node] @ mode[node] for node in VIBRATING)
         moving += TUBE / 3.0 * sum(a @ a + a @ b + b @ b for a, b in bars)
         less = CABLE / 6.0 * sum((a - b) @ (a - b) for a, b in ropes)

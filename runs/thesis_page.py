@@ -148,7 +148,7 @@ def trials_numbers(run: Run) -> dict[str, Any]:
         "same_tau": int((pairs["tau_A"] == 0.0).sum()),
         "fitness_apart": over_trials(pairs["fitness"], 3),
         "weights_apart": fixed(pairs.loc[trial].filter(like="weight ").max()),
-        "pair": pairs.loc[trial].to_dict(),
+        "pair": dict(enumerate(pairs.loc[trial])),  # fitness, weights, time constants
         **weights_pattern(run),
     }
 

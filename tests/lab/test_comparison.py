@@ -15,7 +15,7 @@ from tetra_drake.lab.comparison import (
     comparison_text,
     improvement_over,
 )
-from tetra_drake.scenario.common_sections import Disturbances
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.settings.units import INCH
 
 

@@ -17,7 +17,7 @@ from helpers.converged import shortly
 from tetra_drake.engines.lanes.batch import processor_lanes
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.gym import ROLL, WALK, TensegrityEnv, TensegrityVectorEnv
-from tetra_drake.scenario.common_sections import Disturbances
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.visualization.scene import COLOURS

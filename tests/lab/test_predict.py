@@ -12,10 +12,11 @@ from helpers.anchored import HUNG, SWINGING, scenario_of
 import tetra_drake as td
 from tetra_drake.cli import main
 from tetra_drake.lab.predict.predict import drawn_scenarios, predict, predictions_figure
+from tetra_drake.lab.predict.variates import variates_of
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.tolerances import Tolerance, variates_of
+from tetra_drake.scenario.tolerances import Tolerance
 from tetra_drake.scenario.yaml_text import parse_yaml
 
 STIFFNESS, MASS = "robot.cables.line.stiffness", "robot.masses.b"

@@ -13,8 +13,8 @@ from helpers.synthetic_run import tiny_scenario
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import save_gait, seeded_gait
-from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws, fresh_seed
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.study import robustness
 from tetra_drake.study.robustness import robustness_text

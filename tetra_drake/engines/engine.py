@@ -15,6 +15,7 @@ from tetra_drake.robot.command import driven_robot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 
 _BRIEF = 0.01
 """Duration (s) of a simulation whose only purpose is to compile the kernels."""
@@ -30,7 +31,7 @@ class Engine:
     has_threads: ClassVar[bool] = True
     """True if the engine is faster with several threads, each with its own batch."""
 
-    def check(self, scenario: Scenario) -> None:
+    def check(self, scenario: World) -> None:
         """Raises InputError if the engine cannot simulate the scenario."""
 
     def prepare(self, scenario: Scenario) -> None:
@@ -84,13 +85,13 @@ class Engine:
         return batch.result(0)
 
 
-def engine_of(scenario: Scenario) -> Engine:
+def engine_of(scenario: World) -> Engine:
     """Engine that the scenario's setting `engine` names. Its module is imported on demand."""
     engine: Engine = loaded(f"{scenario.engine.module}:ENGINE")
     return engine
 
 
-def check_can_be_watched(scenario: Scenario) -> None:
+def check_can_be_watched(scenario: World) -> None:
     """Raises InputError if the scenario's engine does not support a viewer."""
     if not engine_of(scenario).can_be_watched:
         engine = scenario.engine_name

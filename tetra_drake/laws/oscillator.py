@@ -110,6 +110,10 @@ class GaitBounds(Section):
         return self
 
 
+_ANY = GaitBounds(weight_min=0.0, weight_max=0.0, tau_a_min=LEAST_TAU, tau_a_max=LEAST_TAU)
+"""Bounds where no gaits are random."""
+
+
 class Wiring(Protocol):
     """Oscillators of a robot and the cables that they drive; see scenario.blueprint.Blueprint."""
 
@@ -161,9 +165,12 @@ class CpgSection(Section):
         gaits."""
         return abs(self.gain) * 0.5 * abs(self.external_input)
 
-    def parameters(self, wiring: Wiring, bounds: GaitBounds) -> Mapping[str, GaitParameter]:
-        """Parameters of a gait by name: weights, gains of the feedback, time constants. Bounds and
-        floors are from Table 5 and listing A.3 of the thesis."""
+    def parameters(
+        self, wiring: Wiring, bounds: GaitBounds | None = None
+    ) -> Mapping[str, GaitParameter]:
+        """Parameters of a gait by name: weights, gains of the feedback, time constants. `bounds`
+        are of random gaits; floors are from listing A.3 of the thesis."""
+        bounds = bounds or _ANY
         weights, low = Weights(wiring, self.reach), bounds.tau_a_min
         names = [f"weight {name}" for name in weights.names]
         weight = GaitParameter(bounds.weight_min, bounds.weight_max, floor=0.0, least=0.0)

@@ -16,7 +16,7 @@ from tetra_drake.laws.oscillator import TAU_B_PER_TAU_A
 from tetra_drake.optimizers.base import Evaluation, Iteration, mean_fitness
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
-from tetra_drake.scenario.common_sections import EvolutionSection
+from tetra_drake.scenario.experiment_sections import EvolutionSection
 
 GAIN_MUTATION = 0.2
 """Largest change of a feedback gain in one mutation."""

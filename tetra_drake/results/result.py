@@ -25,7 +25,6 @@ from tetra_drake.robot.measures import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
-from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.metrics import (
     MOVED,
@@ -38,7 +37,8 @@ from tetra_drake.scenario.metrics import (
     has_rolled,
     headline_metric,
 )
-from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.scenario import Scenario, scenario_of
+from tetra_drake.scenario.simulation import SimulationSection
 from tetra_drake.settings.section import Section
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ def make_result(
         wall_time: wall time of the integration in s.
         record: whether the result has a trajectory.
     """
-    robot = driven.robot
+    robot, scenario = driven.robot, scenario_of(driven.robot.scenario)
     simulation, structure = robot.scenario.simulation, robot.structure
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
@@ -220,16 +220,16 @@ def make_result(
         signals=way.signals[instants >= simulation.settling_time],
     )
     return SimulationResult(
-        scenario=robot.scenario,
+        scenario=scenario,
         robot=robot,
         name=driven.name,
         gait=driven.gait,
         metrics=metrics,
-        fitness=compute_fitness(metrics, robot.scenario.objective),
+        fitness=compute_fitness(metrics, scenario.objective),
         duration=simulation.duration,
         wall_time=wall_time,
         integrator=work,
-        engine=robot.scenario.engine_name,
+        engine=scenario.engine_name,
         path=path,
         recorded=make_dataset(robot, motion.at(samples)) if record else None,
         tally=totals,

@@ -19,9 +19,10 @@ from tetra_drake.errors import InputError, check_whole
 from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.oscillator import GaitParameter
-from tetra_drake.scenario.common_sections import separate
+from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 from tetra_drake.settings.quantities import Quantity
 from tetra_drake.settings.section import Section, written
 from tetra_drake.settings.units import given_quantity
@@ -373,9 +374,9 @@ def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
 
 
 def check_gait(
-    gait: Gait, scenario: Scenario, *, source: object = "", key: str = ""
+    gait: Gait, scenario: World, *, source: object = "", key: str = ""
 ) -> dict[str, float]:
-    """The parameters of a gait in the order of Scenario.parameters. Raises InputError, naming
+    """The parameters of a gait in the order of World.parameters. Raises InputError, naming
     `source` (by default the gait) and key, if they do not fit, or if there is a turn and no
     oscillator is left or right. `key` is the gait's key in the source."""
     source, place = source or f"gait {gait.name}", f"{key}.parameters".strip(".")

@@ -43,7 +43,7 @@ from tetra_drake.robot.struts import (
     strut_contact_law,
 )
 from tetra_drake.scenario.events import Event, blueprint_after, up_to_each
-from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 
 MOST_CORRECTIONS = 100
 """Largest number of corrections of the lengths of elastic struts, in the search for equilibrium."""
@@ -58,7 +58,7 @@ class Robot:
     """A robot of a scenario on its ground at t = 0: what an engine needs for a simulation, except
     a gait or other signals."""
 
-    scenario: Scenario
+    scenario: World
     structure: Structure
     model: Model
     """Constants of bodies, cables and ground, as arguments of the compiled kernels."""
@@ -70,7 +70,7 @@ class Robot:
     """The robot at t = 0, if this one is what events have left of it; otherwise None."""
 
     @classmethod
-    def of(cls, scenario: Scenario, *, at_rest: bool = False) -> Self:
+    def of(cls, scenario: World, *, at_rest: bool = False) -> Self:
         """The robot of a scenario at its start: in equilibrium if its settings say so, then moved
         by the offsets of its bodies, on the scenario's terrain.
 
@@ -319,13 +319,13 @@ class Phase:
     in the frames that they have at t = 0."""
 
 
-def _placed(scenario: Scenario) -> Structure:
+def _placed(scenario: World) -> Structure:
     """The structure of a scenario's robot at the positions of its settings, before any search for
     equilibrium. It has no contact nodes if the scenario has no ground."""
     return Structure.of(scenario.blueprint())
 
 
-def _settled(scenario: Scenario, placed: Structure, model: Model) -> tuple[Structure, Model]:
+def _settled(scenario: World, placed: Structure, model: Model) -> tuple[Structure, Model]:
     """Moves a structure into equilibrium on flat ground. Returns the moved structure and its model.
 
     `placed` and `model` are the structure and its model at the positions of the settings. Elastic
@@ -362,7 +362,7 @@ def _settled(scenario: Scenario, placed: Structure, model: Model) -> tuple[Struc
 
 
 def equilibrium_of(
-    scenario: Scenario, structure: Structure, start: np.ndarray | None = None
+    scenario: World, structure: Structure, start: np.ndarray | None = None
 ) -> Equilibrium:
     """Equilibrium of a structure without actuation, on flat ground if it has contact nodes.
 
@@ -374,7 +374,7 @@ def equilibrium_of(
     return find_equilibrium(model, start, bodies=structure.bodies, source=scenario.name)
 
 
-def make_model(scenario: Scenario, structure: Structure) -> Model:
+def make_model(scenario: World, structure: Structure) -> Model:
     """Constants of a robot as arguments of the compiled kernels: its structure, and the physical
     laws of the scenario. Raises InputError if the structure starts in the ground or outside the
     terrain; see make_ground()."""

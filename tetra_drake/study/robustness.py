@@ -36,8 +36,8 @@ from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, 
 from tetra_drake.machine import versions
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, GivenGait, given_gait, with_body
-from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario

@@ -32,8 +32,8 @@ from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
-from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 

@@ -30,7 +30,7 @@ from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.common_sections import different_keys
+from tetra_drake.scenario.joined_keys import different_keys
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import read_mapping
 from tetra_drake.settings.quantities import (

@@ -17,9 +17,9 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say
 from tetra_drake.lab.fit.measurements import Measured
-from tetra_drake.scenario.common_sections import separate
+from tetra_drake.lab.predict.variates import variates_of
+from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.tolerances import variates_of
 from tetra_drake.settings.quantities import Quantity
 from tetra_drake.settings.section import Tree, value_at
 from tetra_drake.settings.units import given_quantity

@@ -36,6 +36,7 @@ from tetra_drake.figures.style import (
 from tetra_drake.files import given_path
 from tetra_drake.formatting import TextTable, fixed, rounded
 from tetra_drake.lab.page import write_page
+from tetra_drake.lab.predict.variates import Variate, variates_of
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, Driver
@@ -46,7 +47,6 @@ from tetra_drake.scenario.disturbances import stream
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario, save_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.tolerances import Variate, variates_of
 from tetra_drake.settings.quantities import Quantity
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import value_at

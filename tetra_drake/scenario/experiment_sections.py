@@ -1,4 +1,4 @@
-"""Sections of a scenario: their settings with units, limits and defaults.
+"""Sections of an experiment: their settings with units, limits and defaults.
 
 The type of a field gives its unit; values are in SI units. A field without a default must be in the
 file.
@@ -7,32 +7,13 @@ file.
 from __future__ import annotations
 
 import operator
-from collections import Counter
-from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, Field, WithJsonSchema
 
-from tetra_drake.errors import InputError
-from tetra_drake.settings.quantities import Keyed, Speed, Time, Value
-from tetra_drake.settings.refusals import refuse
+from tetra_drake.scenario.joined_keys import different_keys
+from tetra_drake.settings.quantities import Keyed, Time
 from tetra_drake.settings.section import Section
-
-
-def separate(joined: str) -> list[str]:
-    """Splits a key that joins scenario keys by commas: "cpg.gain, robot.density" gives two keys."""
-    return [key.strip() for key in joined.split(",")]
-
-
-def different_keys(by_joined: Mapping[str, Value], *, source: str = "") -> Mapping[str, Value]:
-    """Checks a mapping whose keys may each name several scenario keys, such as "a.b, c.d", and
-    returns it. Raises InputError, naming `source`, if a scenario key occurs twice."""
-    counts = Counter(key for joined in by_joined for key in separate(joined))
-    for key, count in counts.items():
-        if count > 1:
-            raise InputError(source, key, "is given twice")
-    return by_joined
-
 
 BodyBound = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})]
 """A bound of a number in SI, or a text with a unit. Its key decides which units are possible."""
@@ -45,41 +26,6 @@ BodyBounds = Annotated[
 
 BODY_SECTIONS = ("robot", "actuation", "cpg", "friction", "ground", "strut_contact")
 """Sections of a scenario whose numbers can evolve with the gait."""
-
-LONGEST_SETTLING = 3.0
-"""Upper limit (s) of the default of SimulationSection.steady_from."""
-
-
-class SimulationSection(Section):
-    """Duration and sampling of a simulation, and limits beyond which it fails."""
-
-    duration: Time = Field(gt=0, le=1e5)
-    """Simulated time."""
-    steady_from: Time | None = Field(default=None, ge=0)
-    """Time at which the steady walk begins, for fitness and metrics (thesis section 2.3). If not
-    given, a quarter of the duration, at most 3 s."""
-    max_evaluations: int = Field(ge=1)
-    """Largest number of evaluations of the derivatives in one simulation."""
-    sample_period: Time = Field(gt=0)
-    """Time between samples of a recorded trajectory."""
-    control_period: Time = Field(default=0.02, gt=0)
-    """Time between actions of a controller. See td.Simulation."""
-    max_speed: Speed | None = Field(default=None, gt=0)
-    """Speed of a body above which a simulation has diverged. If not given, a speed that the energy
-    of fall, cables and actuators cannot give; at least 10.16 m/s."""
-
-    @property
-    def settling_time(self) -> float:
-        """Time (s) at which the steady walk begins: `steady_from`, or its default."""
-        default = min(LONGEST_SETTLING, self.duration / 4.0)
-        return default if self.steady_from is None else self.steady_from
-
-    @model_validator(mode="after")
-    def _check(self) -> SimulationSection:
-        if self.settling_time >= self.duration:
-            problem = f"found {self.steady_from} s, expected less than the duration"
-            refuse("steady_from", f"{problem}, {self.duration} s; null is a quarter of it")
-        return self
 
 
 class EvolutionSection(Section):
