@@ -25,7 +25,8 @@ from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import WALKING_SEED, Gait, seeded_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import WALKING_SEED, seeded_gait
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS

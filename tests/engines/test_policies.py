@@ -13,7 +13,9 @@ from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import Gait, ParameterSpace, load_gait, save_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait, save_gait
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.policies import driven_names, imported_function
