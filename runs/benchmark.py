@@ -183,7 +183,7 @@ def grounds_table(scenario: Scenario) -> str:
         "the scenario's": {},
         "live network": {"cpg.signals": "live"},
         "feedback": {"cpg.signals": "live", "cpg.feedback": senses},
-        "rough": {"terrain": rough.terrain, "robot.contacts": rough.robot.contacts},
+        "rough": {"terrain": rough.terrain, "robot.contacts": rough.values()["robot.contacts"]},
     }
     batches = []
     for changes in grounds.values():

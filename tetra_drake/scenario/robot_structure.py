@@ -13,7 +13,7 @@ import math
 import operator
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -22,9 +22,8 @@ from pydantic import Field
 
 from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_stretch
 from tetra_drake.laws.model import WORLD
-from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia
+from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
-from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.scenario.structure_graph import (
     Member,
     Pair,
@@ -49,7 +48,6 @@ from tetra_drake.settings.quantities import (
 )
 from tetra_drake.settings.refusals import described, hint, refuse
 from tetra_drake.settings.section import (
-    Kinds,
     Section,
     Varied,
     mapped,
@@ -659,18 +657,3 @@ class ParametricRobot(RobotSettings):
     def _check(self) -> Self:
         self.blueprint().check_sizes()
         return check_tolerances(self)
-
-
-RobotKind = Annotated[Tetrahedra | StructureFile, Kinds(RobotSettings)]
-"""Robot of a scenario: a row of tetrahedra or a structure. A mapping without a tag is a
-Tetrahedra."""
-
-
-def cable_numbers(names: Iterable[str]) -> dict[str, int]:
-    """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its nodes
-    in either order."""
-    numbers: dict[str, int] = {}
-    for number, name in enumerate(names):
-        group, *nodes = name.split()
-        numbers[name] = numbers[" ".join((group, *nodes[::-1]))] = number
-    return numbers
