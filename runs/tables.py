@@ -24,12 +24,14 @@ import jinja2
 import numpy as np
 import pandas
 from analyse import DRAWN, MUJOCO, SHOWN, SPEED, TIGHT, TURNED, Analysis, load_analysis
+from parting import partings
 from PIL import Image
 from readings import RECORD, load_record
 from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, uncertain
 from tetra_drake.laws.friction import Coulomb
@@ -315,6 +317,25 @@ def trials_table(name: str, runs: Runs) -> str:
     return f"{table}\n\nThe engines differ by more than {apart_by} in {trials} {listed(apart)}."
 
 
+def partings_table(name: str, other: str) -> str:
+    """Table of where the trials of a run part from the same trials of another run."""
+    found = partings(load_run(HERE / name), load_run(HERE / other))
+    columns = ["apart", "farthest", "first_best", "second_best"]
+    counts = found[["evaluations", "alike"]].astype(str)
+    rows = [
+        [f"{trial}", *counts.loc[trial], *map(fixed, numbers)]
+        for trial, numbers in found[columns].iterrows()
+    ]
+    headings = [
+        "trial",
+        "gaits",
+        "the same gaits",
+        "their distances, apart by (in)",
+        "at most (in)",
+    ]
+    return TextTable([*headings, f"`{name}` (in)", f"`{other}` (in)"], rows).markdown()
+
+
 def pages(runs: Runs) -> list[Path]:
     """All pages with tables."""
     return [FRONT / README, HERE / README, *(HERE / name / README for name in runs)]
@@ -329,6 +350,7 @@ def made_again(page: Path, runs: Runs) -> str:
             "gallery": lambda: gallery_table(runs),
             "trust": lambda: trust_table(runs),
             "trials": lambda: trials_table(page.parent.name, runs),
+            "partings": lambda: partings_table(page.parent.name, "thesis"),
         }
         return tables[name]()
 
