@@ -44,9 +44,9 @@ ENGINES = {"compiled": Compiled(), "drake": Drake(), "mujoco": Mujoco()}
 SECONDS = {"simulation.duration": 1.0, "simulation.steady_from": 0.5}
 ABOUT = """# Structures of the literature
 
-Tensegrities, cable nets, domes and cable robots of books, papers and public files: {count} structure
-files, each with its source, in equilibrium on three engines. Tests find the known numbers again.
-Made by `python runs/corpus.py`.
+Tensegrities, cable nets, domes and cable robots of books, papers and public files: {count}
+structure files, each with its source, in equilibrium on three engines. Tests find the known numbers
+again. Made by `python runs/corpus.py`.
 
 | | least | median | greatest |
 | --- | ---: | ---: | ---: |
