@@ -2,7 +2,7 @@
 
     python runs/benchmark.py [TABLE ...]
 
-Prints tables in Markdown for tetra_drake/engines/README.md. The gaits are random gaits with seeds
+Prints tables in Markdown for tetra_drake/engines/speed.md. The gaits are random gaits with seeds
 0, 1 ... on the scenario `thesis`. Without names, the tables `engines`, `batches`, `grounds` and
 `controlled` are printed:
 

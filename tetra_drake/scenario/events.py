@@ -28,7 +28,7 @@ class Event(Section):
     tension, and its actuator turns freely."""
     lose: list[str] = Field(default=[])
     """Point masses that fall off: nodes in `masses` of a structure, or bodies with a `payload` of a
-    row. The rest of the body keeps its velocity."""
+    row. The rest keeps its velocity."""
     change: Keyed[str, float | str] = Field(default={})
     """New numbers by scenario key, such as friction.static, of the ground and its friction."""
 

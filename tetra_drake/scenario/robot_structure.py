@@ -105,16 +105,14 @@ class StrutGroup(Section):
     file."""
     contact_radius: Length | None = Field(default=None, ge=0)
     """Radius of the sphere about each end that touches the ground; by default the sphere's radius,
-    else the strut's. 0 for a ground that acts on the centres of nodes. The default is 0 for nodes
-    that anchors hold along z. A bar with round ends rolls about its axis, if no cable is off the
-    axis."""
+    else the strut's; 0 for nodes that anchors hold along z. With 0 the ground acts on the centres
+    of nodes. A bar with round ends rolls about its axis, if no cable is off the axis."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
-    """Axial force per shortening of a strut, E A / l; none for rigid struts. Without load, a strut
-    is as long as the distance of its nodes in the file. In equilibrium, the axial force shortens
-    it, and natural frequencies include its stiffness; in motion it keeps its length. Frequencies
-    leave out the inertia of its elongation. If a strut is 17, 3.3 or 1 times as stiff as its cable,
-    the first frequency is 0.25, 1.2 or 4 % higher than with finite-element rods, and the second is
-    0.75, 3.7 or 12 % higher."""
+    """Axial force per shortening of a strut, E A / l; none for rigid struts. A strut without load
+    is as long as the distance of its nodes in the file. Its force shortens it in equilibrium, and
+    natural frequencies include its stiffness; in motion it keeps its length. Frequencies leave out
+    the inertia of its elongation: if a strut is 17, 3.3 or 1 times as stiff as its cable, the first
+    is 0.25, 1.2 or 4 % higher than with finite-element rods, the second 0.75, 3.7 or 12 %."""
 
 
 class SphereGroup(Section):
@@ -136,8 +134,8 @@ class CableGroup(CableConstants):
     """Cables with the same constants. They never push."""
 
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
-    """The nodes that each cable joins. A cable with more than two nodes, such as [a, b, c], runs
-    over frictionless rings at its inner nodes; it has one tension."""
+    """The nodes that each cable joins. A cable such as [a, b, c] runs over frictionless rings at
+    its inner nodes, with one tension."""
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Tension per elongation."""
     free_length: Length | None = Field(default=None, ge=0)
@@ -149,7 +147,7 @@ class CableGroup(CableConstants):
         list[Annotated[float, Field(gt=0)]],
     ] = Field(default={}, exclude_if=operator.not_)
     """Factors of a number for each cable, in the order of `pairs`, such as `stiffness: [1, 0.98,
-    1.01]`, where the cables of the group are not quite alike."""
+    1.01]`."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> CableGroup:
@@ -202,10 +200,10 @@ class JoinedBody(Section):
     centre: Coordinates | None = None
     """Centre of mass [x, y, z] where the nodes are as in the file."""
     inertia: Annotated[list[InertiaQuantity], Field(min_length=3, max_length=6)] | None = None
-    """Moments of inertia [xx, yy, zz] about the centre of mass, along the axes of the file, where
-    the nodes are as in the file. [xx, yy, zz, xy, xz, yz] also has the products, which are the
-    elements of the matrix (xy is the integral of -x y dm). Without it, the inertia of the parts
-    grows in proportion to the mass."""
+    """Moments of inertia [xx, yy, zz], or with the matrix's products [xx, yy, zz, xy, xz, yz] (xy
+    is the integral of -x y dm), about the centre of mass, along the axes of the file, where the
+    nodes are as in the file. By default the inertia of the parts grows in proportion to the
+    mass."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> JoinedBody:
@@ -250,9 +248,9 @@ class StructureFile(RobotSettings):
     spheres: Keyed[Name, SphereGroup] = Field(default={})
     joints: Keyed[Name, BallJoint] = Field(default={})
     pinned: list[str] = Field(default=[], exclude=True)
-    """Nodes at which struts of several bodies are held together by ball joints. Without, struts
-    that share a node are one body. The first strut's body has the node; each other body has a copy
-    of it, such as n-2 and n-3 for n, and a joint with the same name."""
+    """Nodes at which ball joints hold struts together; elsewhere struts that share a node are one
+    body. The first strut's body has the node; each other body has a copy, such as n-2 and n-3 for
+    n, and a joint with the same name."""
     joint_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
     """Stiffness of pinned nodes, and of joints that give none. The default is the same as for
     anchors."""
@@ -276,13 +274,13 @@ class StructureFile(RobotSettings):
     )
     """Damping, along all axes, of nodes of bodies, such as of a float in oil."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
-    """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
-    and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
+    """Axes along which the world holds nodes, such as xyz: a node of a strut by a spring and a
+    damper from its place in the file; a node of no strut is fixed there."""
     anchor_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness that holds a node of a strut along each axis of its anchor. By default it is 1000
-    times the stiffness of all cables, and at least so great that the robot's weight moves the node
-    by a hundredth of a millimetre per metre of the robot's length. It is no greater than 1e8 / s²
-    times the mass of the lightest body, or 1000 times the stiffness of the stiffest cable."""
+    """Stiffness that holds a node of a strut along each axis of its anchor. By default 1000 times
+    the stiffness of all cables, at least so great that the robot's weight moves the node by 0.01 mm
+    per metre of the robot's length, and at most 1e8 / s² times the mass of the lightest body, or
+    1000 times the stiffest cable."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness of an anchor. With less than 1 ms, a stiff anchor vibrates, and
     steps are short."""
@@ -294,12 +292,12 @@ class StructureFile(RobotSettings):
     """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
     its anchors."""
     ignored: list[str] | None = None
-    """Settings of an imported file that have no effect, because the scenario has its own friction,
-    ground and actuators. They are noted when the file is read."""
+    """Settings of an imported file that have no effect, as the scenario has its own friction,
+    ground and actuators; noted when the file is read."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
     """Tolerances of numbers of the robot by key, such as `cables.side.stiffness: 2 %`,
-    `struts.bar.length: 1 mm` or `nodes: 1 mm`; or in the text of a number, such as `200 N/m ± 2
-    %`. They do not change the robot; td.predict and td.fit use them."""
+    `struts.bar.length: 1 mm` or `nodes: 1 mm`; or in the text of a number: `200 N/m ± 2 %`.
+    td.predict and td.fit use them; the robot does not change."""
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.
