@@ -28,7 +28,13 @@ _RULE = re.compile(r"\|( :?-+:? \|)+")
 
 def percent(share: float, digits: int = 0) -> str:
     """A share as text in percent."""
-    return f"{fixed(100.0 * share, digits)} %"
+    text = fixed(100.0 * share, digits)
+    return text if text == "-" else f"{text} %"
+
+
+def median(records: Iterable[Mapping[str, float]], key: str) -> float:
+    """Median of a number over records; NaN without records."""
+    return float(np.median([record[key] for record in records] or [math.nan]))
 
 
 def over(values: Sequence[float], digits: int = 2) -> str:
@@ -37,14 +43,9 @@ def over(values: Sequence[float], digits: int = 2) -> str:
     return f"{middle} ({low} to {high})"
 
 
-def median(records: Iterable[Mapping[str, float]], key: str) -> float:
-    """Median of a number over records; NaN without records."""
-    return float(np.median([record[key] for record in records] or [math.nan]))
-
-
-def median_over(values: np.ndarray, digits: int = 0) -> str:
-    """Median and range of values as text."""
-    return over([np.median(values), np.min(values), np.max(values)], digits)
+def spanned(values: Sequence[float]) -> str:
+    """A number and its range, (number, low, high), as text with three significant digits."""
+    return ranged(*values)
 
 
 @functools.cache
@@ -58,8 +59,8 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (fixed, rounded, ranged, listed, percent, over, median, median_over)
-    environment.filters.update({filter.__name__: filter for filter in filters})
+    functions = (fixed, rounded, listed, percent, median, over, spanned)
+    environment.filters.update({each.__name__: each for each in functions})
     return environment
 
 

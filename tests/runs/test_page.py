@@ -34,7 +34,7 @@ def test_numbers_have_their_digits_and_none_is_a_dash(rendered):
     text += "{{ rows | median('k') | fixed }}"
     rows = [{"k": 1.0}, {"k": 4.0}]
     assert rendered(text, x=2.25, s=0.5, rows=rows) == "2.2, 50 %, 2.25 (1.00 to 3.00), 2.50"
-    assert rendered(text, x=math.nan, s=math.nan, rows=[]) == "-, - %, - (1.00 to 3.00), -"
+    assert rendered(text, x=math.nan, s=math.nan, rows=[]) == "-, -, - (1.00 to 3.00), -"
 
 
 def test_a_number_that_is_not_given_is_refused(rendered, tmp_path, refused):
