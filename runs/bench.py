@@ -77,7 +77,9 @@ def efficiency(result: SimulationResult) -> float:
 
 SCORES: Mapping[str, Callable[[SimulationResult], float]] = {
     "speed": lambda result: result.metrics.relative_speed,
-    "turning rate": lambda result: math.degrees(result.metrics.heading_change) / result.duration,
+    "turning rate": lambda result: (
+        math.degrees(result.metrics.heading_change) / result.scenario.simulation.duration
+    ),
     "efficiency": efficiency,
 }
 """Scores of motions: speed of the centre along x in body lengths/s; mean rate of the heading in
