@@ -232,8 +232,7 @@ def _evolve(
 
     executor: contextlib.AbstractContextManager[Any] = contextlib.nullcontext()
     if dask is not None:
-        from tetra_drake.evolution.cluster import dask_cluster
-
+        dask_cluster = loaded("tetra_drake.lab.cluster:dask_cluster")
         executor = dask_cluster(dask or None, workers=workers)
     try:
         with executor as make_executor:

@@ -12,9 +12,14 @@ from types import NoneType
 from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.evolution import reevaluation
-from tetra_drake.evolution.cluster import GivenExecutor, maker_of
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
-from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
+from tetra_drake.evolution.evaluators import (
+    GivenExecutor,
+    MakeExecutor,
+    check_guard,
+    evaluator_of,
+    maker_of,
+)
 from tetra_drake.evolution.manifest import Method, RunRecord, read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
@@ -66,7 +71,7 @@ def evolve(
             objective that reads result.trajectory has the attribute `needs_trajectory = True`.
         executor: A concurrent.futures.Executor or a Dask client, which stay open; or a function
             that makes an Executor for a number of workers, such as mpi4py's MPIPoolExecutor; see
-            also evolution.cluster.dask_cluster(). By default the compiled engine simulates the
+            also lab.cluster.dask_cluster(). By default the compiled engine simulates the
             candidates of all trials together, like simulate_many(). The other engines simulate in
             worker processes. If worker processes cannot import the objective, for example in a
             notebook, gaits are simulated one by one.

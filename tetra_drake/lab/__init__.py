@@ -11,4 +11,5 @@ planner        a controller that plans by sampled motions
 prototype      commands for the actuators of a robot
 gym            Gymnasium environments
 films          videos of replay pages
+cluster        executors on Dask's workers
 """

@@ -25,17 +25,14 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake
-from tetra_drake.systems import (
-    AddCables,
-    AddGroundContact,
-    Attach,
-    Cable,
-    Feedback,
-    MatsuokaCpg,
-    StartUpGate,
-    StateForces,
-    Steering,
-)
+from tetra_drake.systems.attachment import Attach
+from tetra_drake.systems.cable_network import AddCables, Cable
+from tetra_drake.systems.feedback import Feedback
+from tetra_drake.systems.ground_contact import AddGroundContact
+from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
+from tetra_drake.systems.start_up_gate import StartUpGate
+from tetra_drake.systems.state_forces import StateForces
+from tetra_drake.systems.steering import Steering
 
 
 def MakeTensegrityDiagram(

@@ -1,24 +1,19 @@
-"""Executors for evolve(): on the workers of a Dask cluster, or the user's own."""
+"""Executors for evolve() on the workers of a Dask cluster."""
 
 from __future__ import annotations
 
 import contextlib
 import logging
-import sys
 from collections.abc import Iterator
-from concurrent.futures import Executor
 from importlib import metadata
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.evaluators import LentExecutor, MakeExecutor, check_guard, deaf_to_ctrl_c
+from tetra_drake.evolution.evaluators import LentExecutor, check_guard, deaf_to_ctrl_c
 from tetra_drake.machine import available_cores, check_package
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
-
-GivenExecutor = Union[Executor, MakeExecutor, "Client"]
-"""An executor, a function that makes one, or a Dask client."""
 
 
 @contextlib.contextmanager
@@ -66,21 +61,6 @@ def executor_of(client: Client) -> LentExecutor:
                 raise InputError("executor", "", problem)
     # Dask refuses a key that has killed its worker. Without `pure`, a resumed run has new keys.
     return LentExecutor(client.get_executor(pure=False), sum(client.nthreads().values()))
-
-
-def maker_of(executor: GivenExecutor | None) -> MakeExecutor | None:
-    """Converts the argument `executor` of evolve() to a function that makes an executor; None stays
-    None. Raises InputError if the argument is neither an executor nor a Dask client nor a
-    function."""
-    if isinstance(executor, Executor):
-        return LentExecutor(executor)
-    dask = sys.modules.get("distributed")
-    if dask and isinstance(executor, dask.Client):
-        return executor_of(executor)
-    if executor is None or callable(executor):
-        return executor
-    expected = "an Executor, a Dask client, or a function that makes an Executor"
-    raise InputError("evolve", "executor", f"found {executor!r:.60}, expected {expected}")
 
 
 def local_cluster(workers: int) -> LocalCluster:

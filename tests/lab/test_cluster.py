@@ -21,9 +21,9 @@ from helpers.converged import shortly
 
 from tetra_drake import cli
 from tetra_drake.evolution import evaluators
-from tetra_drake.evolution.cluster import dask_cluster, local_cluster
 from tetra_drake.evolution.evaluators import evaluate_all, on_executor
 from tetra_drake.evolution.run import load_run
+from tetra_drake.lab.cluster import dask_cluster, local_cluster
 from tetra_drake.scenario.load import dump_scenario
 
 dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
@@ -151,7 +151,7 @@ def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(
     make, tmp_path, monkeypatch, capsys
 ):
     made = Mock(wraps=make)
-    monkeypatch.setattr("tetra_drake.evolution.cluster.local_cluster", made)
+    monkeypatch.setattr("tetra_drake.lab.cluster.local_cluster", made)
 
     def evaluator_of(evaluate, *, executor, **_):
         return on_executor(analytic.Bowl(), executor or ThreadPoolExecutor, 1)
