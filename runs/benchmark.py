@@ -44,7 +44,8 @@ from tetra_drake.formatting import TextTable, fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, controlled_robot
-from tetra_drake.robot.gait import AnyGait, seeded_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import node_positions
@@ -201,7 +202,7 @@ def grounds_table(scenario: Scenario) -> str:
     return TextTable(headings, rows).markdown()
 
 
-def held_gait(scenario: Scenario, gait: AnyGait) -> Command:
+def held_gait(scenario: Scenario, gait: Gait) -> Command:
     """A gait as a command: its signals, constant during each control period."""
     robot, period = Robot.of(scenario), scenario.simulation.control_period
     times = np.arange(0.0, scenario.simulation.duration, period)
@@ -429,7 +430,7 @@ class Tried(NamedTuple):
     seconds: str = ""
 
 
-def default_accuracy(robot: Robot, gait: AnyGait) -> float:
+def default_accuracy(robot: Robot, gait: Gait) -> float:
     """Target accuracy of the engine `drake` for a robot."""
     simulator = MakeSimulator(MakeTensegrityDiagram(robot, gait), robot, Drake())
     return float(simulator.get_integrator().get_target_accuracy())
@@ -437,7 +438,7 @@ def default_accuracy(robot: Robot, gait: AnyGait) -> float:
 
 def try_scheme(
     robot: Robot,
-    gait: AnyGait,
+    gait: Gait,
     scheme: str,
     p_WB: np.ndarray,
     *,

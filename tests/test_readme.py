@@ -198,7 +198,10 @@ def test_the_scenarios_and_the_gait_of_the_pages_load(work: Path) -> None:
     (gait,) = snippets("json", SCENARIOS)
     (work / "gait.json").write_text(gait)
     small = td.load_scenario("feedback").with_changes({"robot.tetrahedra": 3})
-    assert td.load_gait("gait.json", small).gains.length == json.loads(gait)["gains"]["length"]
+    assert td.load_gait("gait.json", small).parameters == {
+        "gain load": 0.0,
+        **json.loads(gait)["parameters"],
+    }
 
 
 FOLDERS = (

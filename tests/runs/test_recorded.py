@@ -18,7 +18,8 @@ from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.lab.elites.elites import elites
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
-from tetra_drake.robot.gait import ParameterSpace, load_gait
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml

@@ -166,6 +166,19 @@ class Blueprint:
         return carriers_of(self.first_node, nodes=len(self.node_names))
 
     @functools.cached_property
+    def distances(self) -> np.ndarray:
+        """Distances (m, m) between the m oscillators: 0 if their cables join the same bodies, 1 if
+        they share a body, 2 if both are at distance 1 of a third, and so on."""
+        from scipy.sparse.csgraph import shortest_path
+
+        joined = [self.bodies_at(cables) for cables in self.groups]
+        shape = len(joined), len(joined)
+        near = np.array([[bool(a & b) for b in joined] for a in joined]).reshape(shape)
+        same = np.array([[a == b for b in joined] for a in joined]).reshape(shape)
+        steps = np.minimum(shortest_path(near, unweighted=True), len(joined))
+        return np.where(same, 0.0, steps)
+
+    @functools.cached_property
     def segments(self) -> Segments:
         """Straight pieces of the cables, in the order of the cables."""
         paths = [

@@ -9,44 +9,11 @@ from __future__ import annotations
 import operator
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, Field, WithJsonSchema
 
 from tetra_drake.scenario.joined_keys import different_keys
 from tetra_drake.settings.quantities import Keyed, Time
-from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
-
-
-class GaitBounds(Section):
-    """Ranges of the parameters of random gaits (Table 5 of the thesis). Equal bounds fix a
-    parameter."""
-
-    weight_min: float = Field(ge=0)
-    """Least weight of the inhibition between oscillators."""
-    weight_max: float = Field(ge=0)
-    """Greatest weight of the inhibition between oscillators."""
-    tau_a_min: Time = Field(gt=0)
-    """Least time constant tau_A of the inner state u of an oscillator."""
-    tau_a_max: Time = Field(gt=0)
-    """Greatest time constant tau_A of the inner state u of an oscillator."""
-    turn: float = Field(default=0.0, ge=-1, le=1)
-    """Steering of all random and evolved gaits, -1 to 1. Left oscillators get the input u0 (1 +
-    turn), right ones u0 (1 - turn)."""
-    mirrored: bool = False
-    """True if random and evolved gaits have the same weights on the left and on the right."""
-    independent_tau_b: bool = False
-    """True if tau_B, the time constant of self-inhibition, evolves by itself. Otherwise it stays at
-    2 tau_A."""
-
-    @model_validator(mode="after")
-    def _check(self) -> GaitBounds:
-        for name, unit in {"weight": "", "tau_a": " s"}.items():
-            low, high = getattr(self, f"{name}_min"), getattr(self, f"{name}_max")
-            if low > high:
-                problem = f"found {low}{unit}, expected at most {name}_max, {high}{unit}"
-                refuse(f"{name}_min", problem)
-        return self
-
 
 BodyBound = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})]
 """A bound of a number in SI, or a text with a unit. Its key decides which units are possible."""

@@ -16,12 +16,12 @@ from pydantic import ConfigDict, Field, model_validator
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.formatting import TextTable, heading_html, listed
+from tetra_drake.laws.oscillator import GaitBounds, GaitParameter
 from tetra_drake.scenario.experiment_sections import (
     BODY_SECTIONS,
     BodyBounds,
     Disturbances,
     EvolutionSection,
-    GaitBounds,
 )
 from tetra_drake.scenario.joined_keys import different_keys, separate
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
@@ -155,6 +155,11 @@ class Scenario(World):
     def draw_count(self) -> int:
         """Number of simulations per gait in evolution: one, or one per draw of disturbances."""
         return self.disturbances.draws if self.disturbances else 1
+
+    @functools.cached_property
+    def parameters(self) -> Mapping[str, GaitParameter]:
+        """Parameters of a gait by name, with the bounds of `gait_bounds`; see World.parameters."""
+        return self.parameters_within(self.gait_bounds)
 
     _split = model_validator(mode="before")(split_tolerances)
     _check_known = model_validator(mode="after")(check_tolerances)
