@@ -109,7 +109,7 @@ class Blueprint:
     """Stiffness (nodes, 3) of the springs that hold the nodes of bodies along x, y and z; 0 along a
     free axis."""
     anchor_damping: np.ndarray
-    """Damping (nodes, 3) of the nodes of bodies along x, y and z."""
+    """Damping (nodes, 3) of the springs that hold the nodes of bodies along x, y and z."""
     payload: np.ndarray
     """Point masses at the centres of mass of the bodies (bodies,)."""
     offsets: np.ndarray

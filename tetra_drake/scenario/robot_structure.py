@@ -35,7 +35,6 @@ from tetra_drake.scenario.structure_graph import (
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.quantities import (
     Acceleration,
-    Damping,
     Density,
     ForceQuantity,
     InertiaQuantity,
@@ -265,14 +264,6 @@ class StructureFile(RobotSettings):
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
-    springs: Keyed[str, Annotated[Stiffness, Field(gt=0)]] = Field(
-        default={}, exclude_if=operator.not_
-    )
-    """Stiffness, along all axes, of springs from nodes of bodies to their places in the file."""
-    dampers: Keyed[str, Annotated[Damping, Field(gt=0)]] = Field(
-        default={}, exclude_if=operator.not_
-    )
-    """Damping, along all axes, of nodes of bodies, such as of a float in oil."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz: a node of a strut by a spring and a
     damper from its place in the file; a node of no strut is fixed there."""
@@ -353,19 +344,15 @@ class StructureFile(RobotSettings):
                 for names in self.actuated.values()
             ),
         )
-        if not (self.joints or held.any() or self.springs or self.dampers):
+        if not (self.joints or held.any()):
             return blueprint
-        springs, dampers = (
-            np.array([[of.get(node, 0.0)] for node in nodes]) for of in (self.springs, self.dampers)
-        )
-        is_firm = bool(self.joints) or held.any()
-        firm = min(blueprint.firm_stiffness(self.gravity)) if is_firm else 0.0
+        firm = min(blueprint.firm_stiffness(self.gravity))
         anchors, of_joints = self.anchor_stiffness or firm, self.joint_stiffness or firm
         joints = np.array([joint.stiffness or of_joints for joint in self.joints.values()])
         return dataclasses.replace(
             blueprint,
-            anchor_stiffness=anchors * blueprint.anchor_stiffness + springs,
-            anchor_damping=anchors * blueprint.anchor_damping + dampers,
+            anchor_stiffness=anchors * blueprint.anchor_stiffness,
+            anchor_damping=anchors * blueprint.anchor_damping,
             joint_stiffness=joints,
             joint_damping=joints * blueprint.joint_damping,
         )
@@ -525,7 +512,7 @@ class StructureFile(RobotSettings):
             if max(map(abs, place)) > LONGEST:
                 expected = f"expected coordinates of at most {LONGEST:g} m"
                 refuse(f"nodes.{node}", f"found {place}, {expected}")
-        blueprint = self.model_copy(update={"springs": {}}).blueprint()  # which hold nothing fast
+        blueprint = self.blueprint()
         self._check_joined(blueprint)
         blueprint.check()
         self._check_actuated(blueprint.cable_names)
@@ -559,8 +546,7 @@ class StructureFile(RobotSettings):
         moving = [(f"masses.{node}", node) for node in self.masses]
         for name, group in self.spheres.items():
             moving += [(f"spheres.{name}.nodes[{i}]", node) for i, node in enumerate(group.nodes)]
-        for key in ("loads", "springs", "dampers"):
-            moving += [(f"{key}.{node}", node) for node in getattr(self, key)]
+        moving += [(f"loads.{node}", node) for node in self.loads]
         if self.contacts != "all":
             moving += [(f"contacts[{i}]", node) for i, node in enumerate(self.contacts)]
         return moving
