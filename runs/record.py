@@ -54,7 +54,7 @@ VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
 TIMES, EXPORTED = "times.json", "lab"
-SO_FAR = "--so-far"
+SO_FAR, EVOLUTION = "--so-far", "evolution"
 RATE = 50.0
 """Sampling rate (Hz) of exported commands."""
 
@@ -147,10 +147,10 @@ EXPERIMENTS = {
         {},
     ),
     "thesis-drake": Experiment(
-        "the same evolved on the Drake diagram itself, where nodes slip",
-        "thesis-reversal",
-        {"evolution.trials": 1, "evolution.evaluations": 250}
-        | {"engine": "!Drake {scheme: radau3, max_step: 8 ms, look_ahead: 0.00002 s}"},
+        "the same evolved on the Drake diagram itself, three trials that are not finished",
+        "thesis",
+        {"evolution.trials": 3},
+        engine="drake",
     ),
     "cma-es": Experiment(
         "the same by CMA-ES, where nodes slip", "thesis", _by(CmaEs(), 10, 4000) | _SLIPPING
@@ -245,7 +245,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     resume, progress = (made / MANIFEST).exists(), Progress(sys.stdout)
     if not resume:
         save_times(load_times(out) | {name: {}}, out)
-    with timed(name, "evolution", out):
+    with timed(name, EVOLUTION, out):
         # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
         evolve(scenario, made, resume=resume, reevaluate=False, report=False, progress=progress)
     publish(name, experiment, made, out=out)
@@ -254,8 +254,10 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
 def record_so_far(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> None:
     """Puts what there is of a run in `scratch`, which another process may evolve, into `out`."""
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / name
+        copy, times = Path(folder) / name, load_times(out)
         thin(scratch / name, copy, whole=True)
+        evolution = {key: time for key, time in times.get(name, {}).items() if key == EVOLUTION}
+        save_times(times | {name: evolution}, out)
         publish(name, experiment, copy, out=out, whole=True)
 
 

@@ -270,20 +270,13 @@ def trials_table(name: str, runs: Runs) -> str:
 
 def partings_table(name: str, other: str) -> str:
     """Table of where the trials of a run part from the same trials of another run."""
-    found = partings(load_run(HERE / name), load_run(HERE / other))
-    columns = ["apart", "farthest", "first_best", "second_best"]
-    counts = found[["evaluations", "alike"]].astype(str)
-    rows = [
-        [f"{trial}", *counts.loc[trial], *map(fixed, numbers)]
-        for trial, numbers in found[columns].iterrows()
-    ]
-    headings = [
-        "trial",
-        "gaits",
-        "the same gaits",
-        "their distances, apart by (in)",
-        "at most (in)",
-    ]
+    found, rows = partings(load_run(HERE / name), load_run(HERE / other)), []
+    for trial, row in found.iterrows():
+        counts = [f"{row[key]:.0f}" for key in ("evaluations", "alike")]
+        apart = [fixed(row[key], 4) for key in ("apart", "farthest")]
+        best = [fixed(row[key]) for key in ("first_best", "second_best")]
+        rows.append([f"{trial}", *counts, *apart, *best])
+    headings = ["trial", "gaits", "the same gaits", "apart, median (in)", "largest (in)"]
     return TextTable([*headings, f"`{name}` (in)", f"`{other}` (in)"], rows).markdown()
 
 
