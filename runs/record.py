@@ -152,9 +152,7 @@ EXPERIMENTS = {
         {"evolution.trials": 3},
         engine="drake",
     ),
-    "cma-es": Experiment(
-        "the same by CMA-ES, where nodes slip", "thesis", _by(CmaEs(), 10, 4000) | _SLIPPING
-    ),
+    "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
     "coulomb": Experiment("the same under friction that grows with the load", "coulomb", {}),
     "incline": Experiment("up an incline of 5°", "incline", _SHORT),
     "steps": Experiment("up four steps of 0.25 in", "steps", _SHORT),
