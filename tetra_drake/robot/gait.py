@@ -22,7 +22,6 @@ from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.world import World
 from tetra_drake.settings.quantities import Quantity
 from tetra_drake.settings.section import Section, written
 from tetra_drake.settings.units import given_quantity
@@ -333,20 +332,23 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
     raw = read_json(given_path(path, "load_gait", "path"), "gait file")
     raw = raw.get(key) if key and isinstance(raw, dict) else raw
     scenario, file = given_scenario(scenario), GaitFile.from_tree(_renewed(raw), path, key=key)
+    place = f"{key}.parameters".strip(".")
     gait = Gait(
         name=file.name or Path(path).stem,
-        parameters=file.parameters,
+        parameters=check_parameters(file.parameters, scenario.parameters, source=path, key=place),
         turn=file.turn,
         body=tuple(file.body.items()),
         scenario=file.scenario,
     )
-    values = check_gait(gait, scenario, source=path, key=key)
+    if gait.turn and (scenario.policy is not None or not scenario.blueprint().sides.any()):
+        problem = f"found {gait.turn}, expected 0: no oscillator is left or right"
+        raise InputError(path, f"{key}.turn".strip("."), problem)
     try:
         with_body(scenario, gait)
     except InputError as error:
         place = f"{key}.body.{error.key}".strip(".")
         raise InputError(path, place, error.problem) from error
-    return dataclasses.replace(gait, parameters=values)
+    return gait
 
 
 class HasBestGait(Protocol):
@@ -371,20 +373,6 @@ def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
     if hasattr(gait, "best_gait"):
         return gait.best_gait()
     raise InputError("gait", "", f"found {gait!r:.60}, expected a gait, its file or a run")
-
-
-def check_gait(
-    gait: Gait, scenario: World, *, source: object = "", key: str = ""
-) -> dict[str, float]:
-    """The parameters of a gait in the order of World.parameters. Raises InputError, naming
-    `source` (by default the gait) and key, if they do not fit, or if there is a turn and no
-    oscillator is left or right. `key` is the gait's key in the source."""
-    source, place = source or f"gait {gait.name}", f"{key}.parameters".strip(".")
-    values = check_parameters(gait.parameters, scenario.parameters, source=source, key=place)
-    if gait.turn and (scenario.policy is not None or not scenario.blueprint().sides.any()):
-        problem = f"found {gait.turn}, expected 0: no oscillator is left or right"
-        raise InputError(source, f"{key}.turn".strip("."), problem)
-    return values
 
 
 def check_parameters(

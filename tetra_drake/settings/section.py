@@ -185,6 +185,8 @@ class Kinds:
     a file, a tag such as `!Winch` chooses the type of a mapping; a mapping without a tag is of the
     first type of the union.
 
+    With `plain`, the first type is written without its tag, as it was before it had others.
+
     With a `base` class, installed plug-ins can add types that derive from it, by entry points of a
     `group`. A section with such a union is built when it is first used (defer_build), because
     plug-ins import this package.
@@ -193,8 +195,10 @@ class Kinds:
     bases: ClassVar[dict[str, tuple[type, ...]]] = {}
     """Base classes of the kinds that plug-ins can add to, by group."""
 
-    def __init__(self, base: type[Section] | None = None, group: str = KINDS) -> None:
-        self.base, self.group = base, group
+    def __init__(
+        self, base: type[Section] | None = None, group: str = KINDS, *, plain: bool = False
+    ) -> None:
+        self.base, self.group, self.plain = base, group, plain
         self.bases[group] = *self.bases.get(group, ()), *([base] if base else ())
 
     def __get_pydantic_core_schema__(
@@ -211,7 +215,10 @@ class Kinds:
 
         tagged = [Annotated[kind, Tag(kind.tag), Field(title=f"!{kind.tag}")] for kind in kinds]
         union: Any = Union[tuple(tagged)]  # noqa: UP007
-        write = pydantic.WrapSerializer(lambda kind, dump: {TAG: kind.tag} | dump(kind))
+        untagged = kinds[0].tag if self.plain else None
+        write = pydantic.WrapSerializer(
+            lambda kind, dump: ({} if kind.tag == untagged else {TAG: kind.tag}) | dump(kind)
+        )
         return handler.generate_schema(Annotated[union, Discriminator(tag_of), write])
 
     def _added(self, tags: set[str], base: Any) -> Iterator[type]:
