@@ -77,12 +77,12 @@ class Experiment:
     def scenario(self, name: str) -> Scenario:
         """Scenario of the run of this name."""
         base = load_scenario(self.base).on_engine(self.engine)
-        step = {} if "engine" in self.changes else _STEP
+        step = _STEP if self.engine == "compiled" else {}
         return base.with_changes({"name": name} | step | dict(self.changes))
 
 
 _STEP = {"engine.max_step": "3 ms"}
-"""The longest step of recorded runs, also where damping is light."""
+"""The longest step of runs on the compiled engine, also where damping is light."""
 
 
 _SOUND = {"require": {"clearance": "0.125 in", "tension": 0.0}}
