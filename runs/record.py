@@ -3,9 +3,9 @@
     python runs/record.py [NAME ...]
 
 Each experiment is evolved and analysed in a folder of out/runs, then thinned into a folder here. A
-page and a picture (made by Chromium) show its best gait. Experiments in README.md are filmed, too.
-After an interruption the script continues; finished experiments are skipped. All pages share the
-viewer meshcat.js of one version of Drake. times.json has the time of each experiment.
+picture (made by Chromium from a replay) and a gait diagram show its best gait. Experiments in
+README.md are filmed, too. After an interruption the script continues; finished experiments are
+skipped. times.json has the time of each experiment.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -46,7 +47,7 @@ from tetra_drake.scenario.scenario import Scenario
 
 HERE = Path(__file__).parent
 SCRATCH = Path("out/runs")
-VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
+PICTURE, FILM = "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
 TIMES, EXPORTED = "times.json", "lab"
@@ -248,7 +249,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
             analyse(made, workers=available_cores())
     with timed(name, "pages", out):
         make_folder(made, shown)
-        show(shown, viewer=out / VIEWER, film=experiment.film)
+        show(shown, film=experiment.film)
         if experiment.exported:
             run = load_run(made)
             export(run.scenario, run.best_gait(), rate=RATE, out=shown / EXPORTED)
@@ -291,14 +292,16 @@ def timed(name: str, stage: str, out: Path) -> Iterator[None]:
         print(f"{name}, {stage}: {duration(spent['wall_s'])}", flush=True)
 
 
-def show(directory: Path, *, viewer: Path, film: bool) -> None:
-    """Simulates a run's best gait on the compiled engine. Writes the page, the picture, the gait
-    diagram and, if the experiment is filmed, the film."""
+def show(directory: Path, *, film: bool) -> None:
+    """Simulates a run's best gait on the compiled engine. Writes the picture, the gait diagram and,
+    if the experiment is filmed, the film."""
     run = load_run(directory)
     result = simulate(run.scenario.on_engine("compiled"), run.best_gait(), record=True)
-    result.save_replay(directory / REPLAY, viewer=viewer)
     films = [directory / FILM] if film else []
-    take_pictures(directory / REPLAY, *films, directory / PICTURE)
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / REPLAY
+        result.save_replay(page)
+        take_pictures(page, *films, directory / PICTURE)
     save_figure(gait_diagram(result), directory, DIAGRAM, kinds=["svg"])
 
 
