@@ -21,11 +21,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from page import rendered
 
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import TextTable
 from tetra_drake.laws.capsules import NoStrutContact
 from tetra_drake.laws.terrain import Nothing
 from tetra_drake.results.result import SimulationResult
@@ -41,11 +41,6 @@ FOLDER = Path(__file__).parents[1] / "tests" / "data" / "corpus"
 MEASURED, KNOWN, PAGE = FOLDER / "measured.json", FOLDER / "known.yaml", FOLDER / "README.md"
 ENGINES = {"compiled": Compiled(), "drake": Drake(), "mujoco": Mujoco()}
 SECONDS = {"simulation.duration": 1.0, "simulation.steady_from": 0.5}
-ABOUT = """# Structures of the literature
-
-Made by `python runs/corpus.py` from the files of this folder; each names its source. Rest: the
-largest displacement of a node within one second from the equilibrium. Speed: simulated time per
-wall time, one robot on the compiled engine. Masses are in kg, frequencies in Hz."""
 
 
 def names() -> list[str]:
@@ -135,26 +130,17 @@ def measured(name: str) -> dict[str, Any]:
     return row
 
 
+def about(name: str) -> str:
+    """Title and source of a structure, from the comments of its file."""
+    text = (FOLDER / f"{name}.yaml").read_text(encoding="utf-8")
+    source = re.search(r"^# source: (.*(?:\n#   .*)*)", text, re.MULTILINE)
+    title = text.splitlines()[0].removeprefix("# ")
+    return f"{title}; {source[1] if source else ''}".replace("\n#   ", " ")
+
+
 def page(rows: dict[str, dict[str, Any]]) -> str:
     """Content of README.md."""
-    table, numbers = [], []
-    for name, row in sorted(rows.items()):
-        text = (FOLDER / f"{name}.yaml").read_text(encoding="utf-8")
-        source = re.search(r"^# source: (.*(?:\n#   .*)*)", text, re.MULTILINE)
-        title = text.splitlines()[0].removeprefix("# ")
-        about = f"{title}; {source[1] if source else ''}".replace("\n#   ", " ")
-        counts = [str(row[key]) for key in ("bodies", "cables", "states", "mechanisms")]
-        rates = [f"{row[key]:.4g}" for key in ("mass", "frequency", "speed")]
-        moved = [row[engine] for engine in ENGINES]
-        shown = [m if isinstance(m, str) else f"{1e6 * m:.2g}" for m in moved]
-        table.append([f"[{name}]({name}.yaml)", about, *counts, *rates, *shown])
-        for what, known, ours, by in row["known"]:
-            numbers.append([name, what, f"{known:.6g}", f"{ours:.6g}", by])
-    headings = ["structure", "source", "bodies", "cables", "self-stress states", "mechanisms"]
-    headings += ["mass", "lowest frequency", "speed", *(f"rest, {e}, um" for e in ENGINES)]
-    known = TextTable(["structure", "quantity", "known", "ours", "by"], numbers)
-    parts = [ABOUT, TextTable(headings, table).markdown(), "## Known numbers", known.markdown()]
-    return "\n\n".join(parts) + "\n"
+    return rendered("corpus.md", rows=dict(sorted(rows.items())), about=about, engines=ENGINES)
 
 
 def main(chosen: list[str]) -> None:
