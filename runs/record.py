@@ -64,6 +64,8 @@ class Experiment:
     """Name of a shipped scenario."""
     changes: Mapping[str, Any]
     """Changes of the scenario by key, without the name."""
+    initial: bool = False
+    """True if its record keeps the genomes of all initial populations, which a page reads."""
     film: bool = False
     """True if its best gait is filmed, for README.md."""
     exported: bool = False
@@ -131,7 +133,7 @@ EXPERIMENTS = {
         {"simulation.steady_from": "2 s"} | _FORMER,
         film=True,
     ),
-    "thesis": Experiment("the thesis's experiment, ten trials", "thesis", {}),
+    "thesis": Experiment("the thesis's experiment, ten trials", "thesis", {}, initial=True),
     "thesis-listing": Experiment(
         "the same as the thesis's code ran: the listing's signals, mutation and distance",
         "thesis-listing",
@@ -248,7 +250,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
             judge_elites(made)
             analyse(made, workers=available_cores())
     with timed(name, "pages", out):
-        make_folder(made, shown)
+        make_folder(made, shown, initial=experiment.initial)
         show(shown, film=experiment.film)
         if experiment.exported:
             run = load_run(made)
@@ -256,11 +258,11 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     shutil.copy(analysis, copy)
 
 
-def make_folder(made: Path, shown: Path) -> None:
+def make_folder(made: Path, shown: Path, *, initial: bool = False) -> None:
     """Thins a run into the folder `shown`, in place of its old trials and exported files."""
     for old in (*shown.glob("trial_*"), *shown.glob(EXPORTED)):
         shutil.rmtree(old)
-    thin(made, shown)
+    thin(made, shown, initial=initial)
 
 
 def load_times(out: Path) -> dict[str, Any]:

@@ -25,7 +25,6 @@ from record import load_times
 from settle import difference_of_means, numbers
 from tables import aspect, best_gait
 from thesis_figures import EVOLVED, mean_fitness, save_figures
-from thinning import last_population
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
@@ -75,10 +74,9 @@ def over_trials(values: pandas.Series, digits: int = 2) -> str:
 
 
 def two_best(run: Run, trial: int) -> pandas.Series:
-    """Absolute differences of fitness and parameters of the two best gaits of a trial's last
-    population, as in Table 8. Gaits with the same parameters count once."""
-    members = last_population(run, trial).filter(regex="^(fitness$|weight_|tau_)")
-    best = members.drop_duplicates(members.columns[1:]).nlargest(2, "fitness")
+    """Absolute differences of fitness and parameters of the two best gaits of a trial, as in
+    Table 8; they are in its last population. Gaits with the same parameters count once."""
+    best = run.best(2).query("trial == @trial").filter(regex="^(fitness$|weight_|tau_)")
     return best.diff().iloc[1].abs()
 
 
