@@ -103,7 +103,7 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
 
 def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     run, thinned = runs
-    assert thinned.fittest().equals(run.fittest())
+    assert thinned.fittest().drop("tension").equals(run.fittest().drop("tension"))
     assert run_text(thinned).replace(str(thinned.directory), str(run.directory)) == run_text(run)
     on_map = [table[["trial", "index"]].to_numpy().tolist() for table in map(elites, runs)]
     assert on_map[0] == on_map[1]
