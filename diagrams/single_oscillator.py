@@ -35,7 +35,6 @@ from tetra_drake.figures.style import common_style, make_figure, save_figure
 from tetra_drake.laws.oscillator import Network
 from tetra_drake.options import quantity
 from tetra_drake.robot.measures import dominant_frequency
-from tetra_drake.robot.network import initial_neurons
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import POUND_FORCE
@@ -68,7 +67,7 @@ def make_diagram(
     neurons = MatsuokaCpg(
         network,
         tonic=cpg.external_input,
-        initial_state=initial_neurons(cpg, oscillators=1),
+        initial_state=cpg.initial_neurons(oscillators=1),
         gain=cpg.gain,
     )
     builder = DiagramBuilder()

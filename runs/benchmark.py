@@ -2,7 +2,7 @@
 
     python runs/benchmark.py [TABLE ...]
 
-Prints tables in Markdown for tetra_drake/engines/README.md. The gaits are random gaits with seeds
+Prints tables in Markdown for tetra_drake/engines/speed.md. The gaits are random gaits with seeds
 0, 1 ... on the scenario `thesis`. Without names, the tables `engines`, `batches`, `grounds` and
 `controlled` are printed:
 
@@ -44,7 +44,8 @@ from tetra_drake.formatting import TextTable, fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, controlled_robot
-from tetra_drake.robot.gait import AnyGait, seeded_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import node_positions
@@ -181,7 +182,7 @@ def grounds_table(scenario: Scenario) -> str:
         "the scenario's": {},
         "live network": {"cpg.signals": "live"},
         "feedback": {"cpg.signals": "live", "cpg.feedback": senses},
-        "rough": {"terrain": rough.terrain, "robot.contacts": rough.robot.contacts},
+        "rough": {"terrain": rough.terrain, "robot.contacts": rough.values()["robot.contacts"]},
     }
     batches = []
     for changes in grounds.values():
@@ -198,7 +199,7 @@ def grounds_table(scenario: Scenario) -> str:
     return TextTable(headings, rows).markdown()
 
 
-def held_gait(scenario: Scenario, gait: AnyGait) -> Command:
+def held_gait(scenario: Scenario, gait: Gait) -> Command:
     """A gait as a command: its signals, constant during each control period."""
     robot, period = Robot.of(scenario), scenario.simulation.control_period
     times = np.arange(0.0, scenario.simulation.duration, period)
@@ -401,7 +402,7 @@ class Tried(NamedTuple):
     seconds: str = ""
 
 
-def default_accuracy(robot: Robot, gait: AnyGait) -> float:
+def default_accuracy(robot: Robot, gait: Gait) -> float:
     """Target accuracy of the engine `drake` for a robot."""
     simulator = MakeSimulator(MakeTensegrityDiagram(robot, gait), robot, Drake())
     return float(simulator.get_integrator().get_target_accuracy())
@@ -409,7 +410,7 @@ def default_accuracy(robot: Robot, gait: AnyGait) -> float:
 
 def try_scheme(
     robot: Robot,
-    gait: AnyGait,
+    gait: Gait,
     scheme: str,
     p_WB: np.ndarray,
     *,

@@ -31,8 +31,7 @@ from tetra_drake.figures.style import OKABE_ITO, common_style, save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.lab.planner import Planner
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, network_gait
-from tetra_drake.robot.network import Weights
+from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.study.robustness import default_disturbances
@@ -45,8 +44,6 @@ GAITS, CANDIDATES = HERE / "gaits.jsonl", HERE / "whole.jsonl"
 """Records: gaits to try; their walks, with each turn, of the whole robot."""
 WALKS, PLANS = HERE / "walks.jsonl", HERE / "plans.jsonl"
 """Records: walks of damaged robots; walks by a planner."""
-PARAMETERS = ("name", "weights", "tau_a", "tau_b")
-"""What is recorded of a gait."""
 
 SEEDS, PERCENT = 5, 5.0
 """Number of disturbed robots, and the size of their disturbances in percent."""
@@ -114,23 +111,27 @@ def scenario() -> Scenario:
 
 
 @functools.cache
-def sources() -> list[int | None]:
-    """For each weight between eight oscillators, the index of the weight between four that it is;
-    None between left and right, which do not inhibit each other."""
-    known, found = Weights.of(load_run(WALKER).scenario).names, []
-    for name in Weights.of(scenario()).names:
-        pair, kind = name.split(" ")
+def sources() -> dict[str, str | None]:
+    """For each parameter of a gait of eight oscillators, the one of four oscillators that it is;
+    None for weights between left and right, which do not inhibit each other."""
+    found: dict[str, str | None] = {}
+    for name in scenario().parameters:
+        if not name.startswith("weight"):
+            found[name] = name
+            continue
+        _, pair, kind = name.split(" ")
         start, end = (int(number) - 1 for number in pair.split("->"))
-        of_link = f"{start // 2 + 1}->{end // 2 + 1} {kind}"
-        found.append(known.index(of_link) if start % 2 == end % 2 else None)
+        of_link = f"weight {start // 2 + 1}->{end // 2 + 1} {kind}"
+        found[name] = of_link if start % 2 == end % 2 else None
     return found
 
 
 def steered(gait: Gait, turn: float) -> Gait:
     """A gait of four oscillators for eight: left and right ones do the same, and the turn makes one
     side stronger."""
-    weights = [0.0 if source is None else gait.weights[source] for source in sources()]
-    return dataclasses.replace(gait, weights=tuple(weights), turn=turn, weight_names=())
+    known = sources().items()
+    values = {name: gait.parameters[source] if source else 0.0 for name, source in known}
+    return dataclasses.replace(gait, parameters=values, turn=turn)
 
 
 def fastest_of_cells() -> list[Gait]:
@@ -142,7 +143,7 @@ def fastest_of_cells() -> list[Gait]:
         cell = tuple((CELLS * shares.iloc[number]).astype(int))
         if cell not in fastest:
             key = rows.iloc[number][["trial", "index"]].astype(int)
-            fastest[cell] = network_gait(run.gait(*key))
+            fastest[cell] = run.gait(*key)
     return [*fastest.values()]
 
 
@@ -150,15 +151,14 @@ def find_gaits() -> None:
     """Records the recorded gait and the gaits of the map."""
     if read(GAITS):
         return
-    gaits = [network_gait(load_run(WALKER).best_gait()), *fastest_of_cells()]
-    rows = [{name: getattr(gait, name) for name in PARAMETERS} for gait in gaits]
-    append(GAITS, rows)
+    gaits = [load_run(WALKER).best_gait(), *fastest_of_cells()]
+    append(GAITS, [{"name": gait.name, "parameters": {**gait.parameters}} for gait in gaits])
 
 
 def possible_trials() -> list[Trial]:
     """All recorded gaits with all TURNS and STRENGTHS. The first one is the robot's before the
     damage."""
-    known = [Gait(**row | {"weights": tuple(row["weights"])}) for row in read(GAITS)]
+    known = [Gait(**row) for row in read(GAITS)]
     gaits = [steered(gait, turn) for gait in known for turn in TURNS]
     return [Trial(gait, strength) for strength in STRENGTHS for gait in gaits]
 

@@ -22,14 +22,16 @@ import numpy as np
 import pandas
 from analyse import DRAWN, MUJOCO, SHOWN, SPEED, TIGHT, TURNED, Analysis, load_analysis
 from page import rendered
+from parting import partings
 from PIL import Image
 from readings import RECORD, load_record
 from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import fixed, rounded, uncertain
+from tetra_drake.formatting import TextTable, fixed, rounded, uncertain
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS, looks_for_turns
@@ -244,6 +246,25 @@ def trials_table(name: str, runs: Runs) -> str:
     return rendered("trials.md", rows=rows, units=units, metrics=by_name, apart_by=apart_by)
 
 
+def partings_table(name: str, other: str) -> str:
+    """Table of where the trials of a run part from the same trials of another run."""
+    found = partings(load_run(HERE / name), load_run(HERE / other))
+    columns = ["apart", "farthest", "first_best", "second_best"]
+    counts = found[["evaluations", "alike"]].astype(str)
+    rows = [
+        [f"{trial}", *counts.loc[trial], *map(fixed, numbers)]
+        for trial, numbers in found[columns].iterrows()
+    ]
+    headings = [
+        "trial",
+        "gaits",
+        "the same gaits",
+        "their distances, apart by (in)",
+        "at most (in)",
+    ]
+    return TextTable([*headings, f"`{name}` (in)", f"`{other}` (in)"], rows).markdown()
+
+
 def pages(runs: Runs) -> list[Path]:
     """All pages with tables."""
     return [FRONT / README, HERE / README, *(HERE / name / README for name in runs)]
@@ -258,6 +279,7 @@ def made_again(page: Path, runs: Runs) -> str:
             "gallery": lambda: gallery_table(runs),
             "trust": lambda: trust_table(runs),
             "trials": lambda: trials_table(page.parent.name, runs),
+            "partings": lambda: partings_table(page.parent.name, "thesis"),
         }
         return tables[name]()
 

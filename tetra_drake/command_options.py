@@ -13,7 +13,7 @@ from tetra_drake.settings.units import INCH
 
 if TYPE_CHECKING:
     from tetra_drake.figures.style import Print
-    from tetra_drake.robot.gait import AnyGait
+    from tetra_drake.robot.gait import Gait
     from tetra_drake.scenario.scenario import Scenario
 
 say = partial(print, flush=True)
@@ -78,12 +78,12 @@ def print_of(width: float, font: float, *, title: bool, pdf: bool) -> Print:
 
 def scenario_and_gait(
     scenario: str | None, gait: Path | None, seed: int | None, engine: str | None = None
-) -> tuple[Scenario, AnyGait]:
+) -> tuple[Scenario, Gait]:
     """The scenario, with the named engine, and the gait that a command simulates, from its options.
     `gait` is a gait file or the folder of a run. Without it, the gait is random, by `seed` or by a
     seed that walks. The scenario has the body that evolved with the gait, if any."""
     from tetra_drake.evolution.run import load_source
-    from tetra_drake.robot.gait import WALKING_SEED, seeded_gait, with_body
+    from tetra_drake.robot.parameter_space import WALKING_SEED, seeded_gait, with_body
     from tetra_drake.scenario.load import load_scenario
 
     if gait is None:

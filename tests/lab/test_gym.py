@@ -17,7 +17,6 @@ from helpers.converged import shortly
 from tetra_drake.engines.lanes.batch import processor_lanes
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.gym import ROLL, WALK, TensegrityEnv, TensegrityVectorEnv
-from tetra_drake.robot.network import AMPLITUDE
 from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -61,7 +60,7 @@ def test_an_action_is_the_signal_as_a_share_of_the_networks(short, actuation):
     env.reset(seed=0)
     env.step(np.array([0.0, 1.0, -1.0, 0.0]))
     simulation: Simulation = env._episodes.simulation
-    amplitude = short.cpg.gain * AMPLITUDE * short.cpg.external_input
+    amplitude = 0.5 * short.cpg.gain * short.cpg.external_input
     shifts = np.array([0.0, 0.0, 1.0, 1.0, -1.0, -1.0, 0.0, 0.0])
     stiffness = simulation.robot.structure.cables["stiffness"][simulation.robot.driven]
     per_newton = -1.0 / stiffness if actuation is WINCH else np.ones(8)

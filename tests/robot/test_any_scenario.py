@@ -7,7 +7,7 @@ import pytest
 from helpers.laws import EXAMPLES
 
 from tetra_drake.errors import InputError
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 

@@ -41,7 +41,8 @@ from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.equilibrium import Unactuated, damping_at_rest, mass_matrix
-from tetra_drake.robot.gait import GivenGait, given_gait, with_body
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
@@ -120,8 +121,8 @@ class _DiagramRobot(LoneRobot):
         self.driven, self._record, self._viewer = driven, record, viewer
         self.first = driven
         robot, engine = driven.robot, driven.robot.scenario.settings_of(Drake)
-        if driven.gait is not None:
-            diagram = MakeTensegrityDiagram(robot, driven.gait, steering=driven.steering)
+        if (gait := driven.oscillating) is not None:
+            diagram = MakeTensegrityDiagram(robot, gait, steering=driven.steering)
         else:
             diagram = MakeTensegrityDiagram(robot, controller=HeldSignals(robot))
         self._diagram, self._steps = diagram, _Steps.of(robot, engine)

@@ -23,7 +23,6 @@ from tetra_drake.engines.states import States
 from tetra_drake.errors import InputError, check_type, check_whole
 from tetra_drake.laws.actuator import limits_of
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -299,7 +298,7 @@ class Planner:
         """Least and greatest actions (2, actions) of a robot with a network, by its signals' usual
         amplitude and by the limits of its actuators."""
         scenario, cables = robot.scenario, robot.starting_cables()
-        amplitude = usual_amplitude(scenario.cpg) * np.array([[-1.0], [1.0]])
+        amplitude = scenario.cpg.usual_amplitude * np.array([[-1.0], [1.0]])
         signals = np.broadcast_to(amplitude, (2, robot.driven.size))
         ends = scenario.actuation.commands(cables._replace(signal=signals))
         least = limits_of(scenario.actuation.actuator()).least_length

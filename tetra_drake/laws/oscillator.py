@@ -12,7 +12,11 @@ y_extensor - y_flexor.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple, Self, TypeAlias
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal, NamedTuple, Protocol, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +33,96 @@ from tetra_drake.settings.section import Section
 U, V, U_RATE, V_RATE, Y, U_START, V_START, U_SUM, V_SUM, NEURON_COLUMNS = range(10)
 """Columns of the table `neurons` (2n, 9), and their number: inner state u, self-inhibition v, their
 rates (1/s), output y, u and v at the beginning of a step, sums of their rates."""
+
+
+LARGEST_GAIN = 1.0
+"""Largest absolute value of a feedback gain in random gaits."""
+
+TAU_B_PER_TAU_A = 2.0
+"""Ratio of the time constants in the thesis. With it the output resembles a sine wave."""
+
+LEAST_TAU = 1e-9
+"""Least time constant (s) of a neuron."""
+
+NEURONS = "extensor", "flexor"
+"""Kinds of neurons, by index modulo 2."""
+
+
+class GaitParameter(NamedTuple):
+    """A number of a gait, as searches see it, in SI units."""
+
+    low: float
+    """Least value in random gaits; equal to `high` if it is fixed."""
+    high: float
+    floor: float = -math.inf
+    """Limit that searches keep it above."""
+    least: float = -math.inf
+    """Smaller values are refused."""
+    unit: str = ""
+    copies: str = ""
+    """Name of an earlier parameter that it is always equal to in random and evolved gaits."""
+    leader: str = ""
+    """Name of an earlier parameter that it follows: random gaits have `ratio` times its value."""
+    ratio: float = 1.0
+    coupled: bool = True
+    """True if evolved gaits have this ratio, too."""
+    default: float | None = None
+    """Value if a gait file does not have it."""
+
+    @property
+    def has_default(self) -> bool:
+        """True if a gait file need not have it."""
+        return bool(self.leader) or self.default is not None
+
+    def default_among(self, values: Mapping[str, float]) -> float:
+        """Value if a gait file does not have it, by the values of earlier parameters."""
+        return self.ratio * values[self.leader] if self.leader else self.default or 0.0
+
+
+class GaitBounds(Section):
+    """Ranges of the parameters of random gaits (Table 5 of the thesis). Equal bounds fix a
+    parameter."""
+
+    weight_min: float = Field(ge=0)
+    """Least weight of the inhibition between oscillators."""
+    weight_max: float = Field(ge=0)
+    """Greatest weight of the inhibition between oscillators."""
+    tau_a_min: Time = Field(gt=0)
+    """Least time constant tau_A of the inner state u of an oscillator."""
+    tau_a_max: Time = Field(gt=0)
+    """Greatest time constant tau_A of the inner state u of an oscillator."""
+    turn: float = Field(default=0.0, ge=-1, le=1)
+    """Steering of all random and evolved gaits, -1 to 1. Left oscillators get the input u0 (1 +
+    turn), right ones u0 (1 - turn)."""
+    mirrored: bool = False
+    """True if random and evolved gaits have the same weights on the left and on the right."""
+    independent_tau_b: bool = False
+    """True if tau_B, the time constant of self-inhibition, evolves by itself. Otherwise it stays at
+    2 tau_A."""
+
+    @model_validator(mode="after")
+    def _check(self) -> GaitBounds:
+        for name, unit in {"weight": "", "tau_a": " s"}.items():
+            low, high = getattr(self, f"{name}_min"), getattr(self, f"{name}_max")
+            if low > high:
+                problem = f"found {low}{unit}, expected at most {name}_max, {high}{unit}"
+                refuse(f"{name}_min", problem)
+        return self
+
+
+_ANY = GaitBounds(weight_min=0.0, weight_max=0.0, tau_a_min=LEAST_TAU, tau_a_max=LEAST_TAU)
+"""Bounds where no gaits are random."""
+
+
+class Wiring(Protocol):
+    """Oscillators of a robot and the cables that they drive; see scenario.blueprint.Blueprint."""
+
+    @property
+    def signals(self) -> int: ...
+    @property
+    def images(self) -> Sequence[int | None]: ...
+    @property
+    def distances(self) -> np.ndarray: ...
 
 
 class CpgSection(Section):
@@ -64,6 +158,103 @@ class CpgSection(Section):
         if self.feedback and self.signals != "live":
             refuse("signals", f"found '{self.signals}', expected 'live' for feedback")
         return self
+
+    @property
+    def usual_amplitude(self) -> float:
+        """Typical amplitude (N) of the signals; 0.44 to 0.53 times gain and tonic input in random
+        gaits."""
+        return abs(self.gain) * 0.5 * abs(self.external_input)
+
+    def parameters(
+        self, wiring: Wiring, bounds: GaitBounds | None = None
+    ) -> Mapping[str, GaitParameter]:
+        """Parameters of a gait by name: weights, gains of the feedback, time constants. `bounds`
+        are of random gaits; floors are from listing A.3 of the thesis."""
+        bounds = bounds or _ANY
+        weights, low = Weights(wiring, self.reach), bounds.tau_a_min
+        names = [f"weight {name}" for name in weights.names]
+        weight = GaitParameter(bounds.weight_min, bounds.weight_max, floor=0.0, least=0.0)
+        found = dict.fromkeys(names, weight)
+        for place, image in enumerate(weights.images.tolist() if bounds.mirrored else ()):
+            if image < place:
+                found[names[place]] = weight._replace(copies=names[image])
+        gain = GaitParameter(-LARGEST_GAIN, LARGEST_GAIN, default=0.0)
+        found |= {f"gain {name}": gain for name in self.feedback}
+        tau = GaitParameter(low, bounds.tau_a_max, floor=low, least=LEAST_TAU, unit="s")
+        follower = tau._replace(
+            **{key: TAU_B_PER_TAU_A * getattr(tau, key) for key in ("low", "high", "floor")},
+            leader="tau_A",
+            ratio=TAU_B_PER_TAU_A,
+            coupled=not bounds.independent_tau_b,
+        )
+        return found | {"tau_A": tau, "tau_B": follower}
+
+    def network(self, wiring: Wiring, gait: Mapping[str, float]) -> Network:
+        """Constants of the network that a gait gives a robot. `gait` has the parameters by name."""
+        neurons, weights = np.arange(2 * wiring.signals), Weights(wiring, self.reach)
+        inhibition = np.zeros((neurons.size, neurons.size))
+        inhibition[neurons, neurons ^ 1] = self.partner_weight
+        inhibition[tuple(weights.couplings.T)] = [gait[f"weight {name}"] for name in weights.names]
+        return Network.of(
+            inhibition,
+            tau_a=gait["tau_A"],
+            tau_b=gait["tau_B"],
+            self_inhibition_weight=self.self_inhibition_weight,
+        )
+
+    def initial_neurons(self, oscillators: int) -> np.ndarray:
+        """State (4n,) at t = 0 of the 2n neurons of n = `oscillators` oscillators: the inner states
+        u of all neurons, then the self-inhibitions v. Extensor and flexor alternate.
+
+        The numbers are from Table 4 of the thesis.
+        """
+        inner_state, extensor_self_inhibition, flexor_self_inhibition = self.initial_state
+        u = np.full(2 * oscillators, inner_state)
+        v = np.tile([extensor_self_inhibition, flexor_self_inhibition], oscillators)
+        return np.concatenate([u, v])
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Connections between the oscillators of a robot. A gait has a weight for each connection."""
+
+    wiring: Wiring
+    reach: int | None
+    """Largest distance between oscillators that inhibit each other, counted in steps between
+    oscillators that share a body; None for no limit."""
+
+    @functools.cached_property
+    def couplings(self) -> np.ndarray:
+        """Indices of the two neurons of each weight (weights, 2): the inhibited one, then the
+        inhibiting one. The neurons 2k and 2k + 1 are extensor and flexor of oscillator k.
+
+        Weights are sorted by inhibited neuron, then by inhibiting neuron, as in listing B.2 of the
+        thesis. Both neurons of a weight have the same kind.
+        """
+        kind = np.arange(2 * self.wiring.signals) % 2
+        coupled = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
+        if self.reach is not None:
+            coupled &= np.kron(self.wiring.distances, np.ones((2, 2))) <= self.reach
+        return np.argwhere(coupled)
+
+    @functools.cached_property
+    def images(self) -> np.ndarray:
+        """Index of the mirror image of each weight (weights,): the weight between the oscillators
+        on the robot's other side, left and right exchanged. A weight without an image has its own
+        index."""
+        images = self.wiring.images
+        opposite = [k if image is None else image for k, image in enumerate(images)]
+        neurons = np.add.outer(2 * np.array(opposite, dtype=int), [0, 1]).ravel()
+        index = {(i, j): weight for weight, (i, j) in enumerate(self.couplings.tolist())}
+        pairs = neurons[self.couplings].tolist()
+        return np.array([index.get((i, j), w) for w, (i, j) in enumerate(pairs)], dtype=int)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the weights: with "3->1 extensor", the extensor of oscillator 3 inhibits the
+        extensor of oscillator 1. Oscillators are counted from 1."""
+        pairs = self.couplings.tolist()
+        return tuple(f"{j // 2 + 1}->{i // 2 + 1} {NEURONS[i % 2]}" for i, j in pairs)
 
 
 class Network(NamedTuple):

@@ -46,7 +46,8 @@ from tetra_drake.on_demand import loaded
 from tetra_drake.report import summary
 from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
 from tetra_drake.results.result import SimulationResult, headline
-from tetra_drake.robot.gait import AnyGait, Gait, PolicyParameters, load_gait, save_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait, save_gait
 from tetra_drake.robot.remarks import stillness_remark
 from tetra_drake.scenario import metrics
 from tetra_drake.scenario.load import SCENARIO, load_scenario
@@ -56,7 +57,9 @@ REPORT, FIGURES = "report.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites/elites.csv"
 
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
-_MOST_PARAMETERS = 40  # of a policy; further ones are not shown
+_MOST_PARAMETERS = 40  # further ones are not shown
+_WEIGHT = "weight "
+"""Beginning of the names of weights between oscillators."""
 RECORDED_GAIT, RECORDED = Path(__file__).with_name("thesis_gait.json"), "recorded.html"
 """The best recorded gait of the thesis's robot, and the name of its replay page."""
 BLOCK_DIAGRAM = Path(__file__).parents[1] / "systems/robot.svg"
@@ -270,18 +273,14 @@ def _data_uri(drawing: Path) -> str:
     return f"data:image/svg+xml;base64,{base64.b64encode(drawing.read_bytes()).decode()}"
 
 
-def _parameters_text(gait: AnyGait, scenario: Scenario) -> str:
-    """Sentence with the parameters of a gait except its weights, or of a policy."""
-    if isinstance(gait, PolicyParameters):
-        pairs = zip(scenario.policy_parameters, gait.values, strict=True)
-        shown = [f"{name}: {rounded(value)}" for name, value in pairs][:_MOST_PARAMETERS]
-        if more := len(gait.values) - len(shown):
-            shown.append(f"{more} more")
-        return f"Parameters of the policy: {listed(shown)}"
-    gains = [f"feedback gain of {name} {rounded(gain)}" for name, gain in gait.gains if gain]
-    turn = [f"turn {rounded(gait.turn)}"] if gait.turn else []
-    times = [f"τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s"]
-    return f"Time constants {listed([*times, *turn, *gains])}"
+def _parameters_text(gait: Gait, scenario: Scenario) -> str:
+    """Sentence with the parameters of a gait except its weights, and with its turn."""
+    others = {name: x for name, x in gait.parameters.items() if not name.startswith(_WEIGHT)}
+    units = {name: one.unit for name, one in scenario.parameters.items()}
+    others |= {"turn": gait.turn} if gait.turn else {}
+    shown = [f"{name} {rounded(x)} {units.get(name, '')}".strip() for name, x in others.items()]
+    more = [f"{len(shown) - _MOST_PARAMETERS} more"] if len(shown) > _MOST_PARAMETERS else []
+    return listed([*shown[:_MOST_PARAMETERS], *more])
 
 
 def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str:
@@ -322,9 +321,11 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
         gaits=gaits,
         map=_notable(shown),
         parameters=_parameters_text(gait, scenario),
-        weights=dict(zip(gait.weight_names, gait.weights, strict=True))
-        if isinstance(gait, Gait)
-        else {},
+        weights={
+            name.removeprefix(_WEIGHT): weight
+            for name, weight in gait.parameters.items()
+            if name.startswith(_WEIGHT)
+        },
         differences=differences,
         files={
             "scenario": SCENARIO,

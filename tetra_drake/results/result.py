@@ -20,7 +20,7 @@ from tetra_drake.formatting import Say, fixed, heading_html, silent, uncertain
 from tetra_drake.laws.tally import Tally
 from tetra_drake.on_demand import loaded
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
-from tetra_drake.robot.gait import AnyGait
+from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.measures import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
@@ -68,8 +68,8 @@ class SimulationResult:
     """The simulated robot; without a network if it followed a command."""
     name: str
     """Name of the gait or command."""
-    gait: AnyGait | None = field(repr=False, compare=False)
-    """The gait, or the parameters of a policy; None for a command."""
+    gait: Gait | None = field(repr=False, compare=False)
+    """The gait; None for a command or a controller."""
     metrics: Metrics
     fitness: float
     duration: float
@@ -223,7 +223,7 @@ def make_result(
         scenario=scenario,
         robot=robot,
         name=driven.name,
-        gait=driven.gait if driven.pilot is None else driven.pilot.parameters,
+        gait=driven.gait,
         metrics=metrics,
         fitness=compute_fitness(metrics, scenario.objective),
         duration=simulation.duration,

@@ -13,12 +13,13 @@ import numpy as np
 
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.gait import AnyGait, PolicyParameters, with_body
-from tetra_drake.robot.network import SteeringSignal, usual_amplitude
+from tetra_drake.robot.gait import Gait, check_gait
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot, Pilot
-from tetra_drake.scenario.policies import DrivenRobots
+from tetra_drake.robot.steering import SteeringSignal
+from tetra_drake.scenario.policies import DrivenRobots, PolicyKind
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -63,8 +64,8 @@ class Command:
         raise InputError(source, "samples", problem)
 
 
-Driver = AnyGait | Command
-"""A gait, a policy's parameters or a command: what drives the actuators without a controller."""
+Driver = Gait | Command
+"""A gait or a command: what drives the actuators without a controller."""
 
 
 def driven_robot(
@@ -82,23 +83,19 @@ def driven_robot(
     `robot` is the scenario's robot if it is made already.
 
     Raises InputError for a command without samples, or whose number of cables is not the robot's
-    number of driven cables. Also for a gait if the scenario has a policy, for parameters of a
-    policy that it does not have, and for steering of a policy. The robot of a gait with a body has
-    this body.
+    number of driven cables. Also for a gait with other parameters than the scenario's oscillators
+    or policy, and for steering of a policy. The robot of a gait with a body has this body.
     """
     if not isinstance(driver, Command) and driver.body:
         scenario, driver = with_body(scenario, driver)
         robot = None
     robot = robot or Robot.of(scenario)
-    if isinstance(driver, PolicyParameters):
+    if not isinstance(driver, Command):
+        if scenario.policy is None:
+            return DrivenRobot.of(robot, driver, steering=steering)
         if steering is not None:
             raise InputError("steering", "", f"found a function, and {driver.name} is for a policy")
-        return _piloted_robot(robot, driver)
-    if not isinstance(driver, Command):
-        if scenario.policy is not None:
-            expected = f"expected parameters of a policy, which scenario {scenario.name} has"
-            raise InputError(f"gait {driver.name}", "", f"found a gait, {expected}")
-        return DrivenRobot.of(robot, driver, steering=steering)
+        return _piloted_robot(robot, driver, scenario.policy)
     robot = robot.without_network()
     driver.check(robot)
     step = scenario.cpg.listing_step
@@ -118,14 +115,11 @@ def controlled_robot(scenario: Scenario) -> Robot:
     return Robot.of(scenario).controlled
 
 
-def _piloted_robot(robot: Robot, parameters: PolicyParameters) -> DrivenRobot:
-    """A robot driven by its scenario's policy with these parameters, whose first signals act from
-    the start on. Raises InputError if the scenario has no policy, or one with other parameters."""
-    scenario, policy = robot.scenario, robot.scenario.policy
-    expected, step = len(scenario.policy_parameters), scenario.cpg.listing_step
-    if policy is None or len(parameters.values) != expected:
-        problem = f"found {len(parameters.values)}, scenario {scenario.name} has {expected}"
-        raise InputError(f"policy {parameters.name}", "parameters", problem)
+def _piloted_robot(robot: Robot, gait: Gait, policy: PolicyKind) -> DrivenRobot:
+    """A robot driven by its scenario's policy with the parameters of a gait, whose first signals
+    act from the start on. Raises InputError if the gait has other parameters."""
+    scenario, step = robot.scenario, robot.scenario.cpg.listing_step
+    values = np.array([*check_gait(gait, scenario).values()], dtype=float)
     controlled, structure = robot.controlled, robot.structure
     cables, struts = robot.starting_cables(), structure.p_WN[structure.struts]
     size = np.linalg.norm(np.diff(struts[0], axis=0)) if len(struts) else scenario.robot.size
@@ -134,17 +128,17 @@ def _piloted_robot(robot: Robot, parameters: PolicyParameters) -> DrivenRobot:
         ends=structure.cable_ends[robot.driven],
         cables=cables,
         rest=scenario.actuation.commands(cables),
-        amplitude=np.array(usual_amplitude(scenario.cpg)),
+        amplitude=np.array(scenario.cpg.usual_amplitude),
         lengths=structure.initial_lengths,
         weight=np.array(robot.weight),
         size=np.array(size),
     )
     period = step * round(scenario.simulation.control_period / step)
-    pilot = Pilot(policy=policy, parameters=parameters, robots=robots, period=period)
+    pilot = Pilot(policy=policy, values=values, robots=robots, period=period)
     readings = Readings(*(np.array(values)[np.newaxis] for values in first_readings(controlled)))
     samples = policy_signals([pilot], readings)
     controlled = dataclasses.replace(controlled, first_signals=samples[0])
-    return DrivenRobot(robot=controlled, name=parameters.name, samples=samples, pilot=pilot)
+    return DrivenRobot(robot=controlled, name=gait.name, samples=samples, gait=gait, pilot=pilot)
 
 
 def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
@@ -158,7 +152,7 @@ def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
         some = [pilots[row] for row in rows]
         arrays = [pilot.robots[2:] for pilot in some]
         together = DrivenRobots(*some[0].robots[:2], *_stacked(arrays))
-        values = np.array([pilot.parameters.values for pilot in some])
+        values = np.array([pilot.values for pilot in some])
         signals[rows] = some[0].policy.signals(together, readings.rows(rows), values)
     return signals
 

@@ -12,7 +12,6 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import rounded
 from tetra_drake.laws import cable
-from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.blueprint import SAGS
@@ -138,5 +137,5 @@ def _usual_signal(robot: Robot) -> tuple[float, np.ndarray]:
     """Typical amplitude (N) of a network's signals, and the elastic stretch (driven cables,) in m
     of each driven cable under a force of this size."""
     cpg, law = robot.scenario.cpg, cable.CableLaw.of(robot.structure.cables[robot.driven])
-    signal = usual_amplitude(cpg)
+    signal = cpg.usual_amplitude
     return signal, np.asarray(cable.elastic_stretch(signal, law))

@@ -33,7 +33,7 @@ from tetra_drake.robot.equilibrium import (
 )
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import lift, make_ground
-from tetra_drake.robot.network import SteeringSignal, Weights, checked_turn
+from tetra_drake.robot.steering import SteeringSignal, checked_turn
 from tetra_drake.robot.structure import Structure, with_origins
 from tetra_drake.robot.struts import (
     axial_forces,
@@ -249,20 +249,11 @@ class Robot:
 
     def network(self, gait: Gait) -> Network:
         """Constants of the oscillator network that a gait gives this robot. Raises InputError if
-        the gait does not fit the scenario."""
-        cpg = self.scenario.cpg
-        weights = Weights(self.structure, cpg.reach)
-        check_gait(gait, self.scenario, weights, source=f"gait {gait.name}")
-        neurons = np.arange(2 * self.structure.signals)
-        inhibition = np.zeros((neurons.size, neurons.size))
-        inhibition[neurons, neurons ^ 1] = cpg.partner_weight
-        inhibition[tuple(weights.couplings.T)] = gait.weights
-        return Network.of(
-            inhibition,
-            tau_a=gait.tau_a,
-            tau_b=gait.tau_b,
-            self_inhibition_weight=cpg.self_inhibition_weight,
-        )
+        the gait does not fit the scenario, or this has a policy in place of oscillators."""
+        if self.scenario.policy is not None:
+            problem = f"expected a controller: scenario {self.scenario.name} has a policy"
+            raise InputError(f"gait {gait.name}", "", problem)
+        return self.scenario.cpg.network(self.structure, check_gait(gait, self.scenario))
 
     def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
         """Turns, -1 to 1: how much more input left oscillators have than right ones.

@@ -16,13 +16,13 @@ from tetra_drake.laws.actuator import Actuation, Force
 from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
-from tetra_drake.laws.oscillator import CpgSection
+from tetra_drake.laws.oscillator import CpgSection, GaitBounds, GaitParameter
 from tetra_drake.laws.terrain import Flat, Terrain
-from tetra_drake.scenario.blueprint import Blueprint
+from tetra_drake.scenario.blueprint import Blueprint, cable_numbers
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
 from tetra_drake.scenario.events import Event, check_taken, up_to_each
-from tetra_drake.scenario.policies import Policy, PolicyBounds
-from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
+from tetra_drake.scenario.policies import Policy
+from tetra_drake.scenario.robot_settings import RobotKind
 from tetra_drake.scenario.simulation import SimulationSection
 from tetra_drake.settings.refusals import TAG, hint, refuse
 from tetra_drake.settings.section import Section, Tree, flattened
@@ -110,10 +110,18 @@ class World(Section):
         return [name for number, name in enumerate(names) if number not in cut]
 
     @functools.cached_property
-    def policy_parameters(self) -> Mapping[str, PolicyBounds]:
-        """Names of the parameters of the scenario's policy, with their bounds in random policies;
-        empty without a policy."""
-        return {} if self.policy is None else self.policy.parameters(self.blueprint())
+    def parameters(self) -> Mapping[str, GaitParameter]:
+        """Parameters of a gait by name: of the policy if there is one, otherwise of the
+        oscillators."""
+        return self.parameters_within(None)
+
+    def parameters_within(self, bounds: GaitBounds | None) -> Mapping[str, GaitParameter]:
+        """Parameters of a gait by name. Random gaits are within `bounds`, if there are any."""
+        blueprint = self.blueprint()
+        if self.policy is None:
+            return self.cpg.parameters(blueprint, bounds)
+        pairs = self.policy.parameters(blueprint)
+        return {name: GaitParameter(*pair) for name, pair in pairs.items()}
 
     def blueprint(self) -> Blueprint:
         """The blueprint of the robot, without contact nodes if there is no ground."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import NoneType
-from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +18,10 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.gait import AnyGait, Gait, network_gait
-from tetra_drake.robot.network import SteeringSignal, initial_neurons
+from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import signal_samples
+from tetra_drake.robot.signals import gains_of, signal_samples
+from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.attachment import Attach
@@ -37,7 +36,7 @@ from tetra_drake.systems.steering import Steering
 
 def MakeTensegrityDiagram(
     robot: Robot,
-    gait: AnyGait | None = None,
+    gait: Gait | None = None,
     *,
     steering: SteeringSignal | None = None,
     controller: System | None = None,
@@ -111,13 +110,12 @@ def MakeTensegrityDiagram(
     """
     source = "MakeTensegrityDiagram"
     check_type(source, "robot", robot, Robot)
-    check_type(source, "gait", gait, *get_args(AnyGait), NoneType)
+    check_type(source, "gait", gait, Gait, NoneType)
     check_type(source, "controller", controller, System, NoneType)
     check_type(source, "ground", ground, System, NoneType)
     check_type(source, "scene_graph", scene_graph, bool)
     check_type(source, "meshcat", meshcat, Meshcat, NoneType)
     scenario, structure = robot.scenario, robot.structure
-    gait = None if gait is None else network_gait(gait)
     builder = DiagramBuilder()
 
     plant, scene = _AddPlant(builder, scene_graph=scene_graph or meshcat is not None)
@@ -173,8 +171,7 @@ def MakeTensegrityDiagram(
         actuators = builder.GetSubsystemByName("cables_actuators")
         builder.ExportOutput(actuators.get_output_port(), "drives")
     if builder.HasSubsystemNamed("cpg") and scenario.cpg.feedback:
-        assert gait is not None
-        feedback = Feedback(robot, gains=[gain for _, gain in gait.gains])
+        feedback = Feedback(robot, gains=gains_of(gait))
         _AddFeedback(builder, feedback, state, signals, ground)
 
     builder.ExportOutput(state, "state")
@@ -341,7 +338,7 @@ def _AddSignals(
         network = MatsuokaCpg(
             robot.network(gait),
             tonic=cpg.external_input,
-            initial_state=initial_neurons(cpg, size),
+            initial_state=cpg.initial_neurons(size),
             gain=cpg.gain,
         )
         oscillators = builder.AddNamedSystem("cpg", network)

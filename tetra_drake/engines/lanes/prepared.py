@@ -17,7 +17,6 @@ from tetra_drake.laws.actuator import DRIVE, limits_of
 from tetra_drake.laws.forces import sizes_of
 from tetra_drake.laws.oscillator import make_neurons
 from tetra_drake.results.result import motion_times
-from tetra_drake.robot.network import initial_neurons
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Compiled, look_ahead
@@ -101,7 +100,7 @@ class Prepared:
         start.modes[:] = robot.starting_modes
         start.signals[:] = robot.first_signals
         start.drives[:, DRIVE] = robot.starting_drives()
-        start.neurons[:] = make_neurons(initial_neurons(cpg, structure.signals))
+        start.neurons[:] = make_neurons(cpg.initial_neurons(structure.signals))
         start.tonic[:] = robot.tonic_input(turns)[0]
         return cls(driven, record, times, turns, sizes, constants, kind, start)
 

@@ -50,7 +50,6 @@ from tetra_drake.engines.simulation import Simulation, checked_actions, is_list
 from tetra_drake.engines.states import States
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.results.result import SimulationResult, poses_of
-from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario
@@ -213,7 +212,7 @@ class _Episodes:
         the environment. Each is a force, free length or tension, depending on the actuators."""
         shape = self.simulation.count, *self.action_space.shape
         actions = checked_actions(actions, shape, source="tetra_drake.gym")
-        signals = usual_amplitude(self._scenario.cpg) * actions[:, self._groups]
+        signals = self._scenario.cpg.usual_amplitude * actions[:, self._groups]
         return np.asarray(self._scenario.actuation.commands(self._cables._replace(signal=signals)))
 
     def pictures(self) -> tuple[np.ndarray, ...]:
