@@ -41,7 +41,6 @@ from tetra_drake.figures.style import save_figure
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import duration, listed
 from tetra_drake.lab.elites.elites import judge_elites
-from tetra_drake.lab.prototype.export import export
 from tetra_drake.machine import available_cores
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
@@ -53,10 +52,8 @@ SCRATCH = Path("out/runs")
 PICTURE, FILM = "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
-TIMES, EXPORTED = "times.json", "lab"
+TIMES = "times.json"
 SO_FAR = "--so-far"
-RATE = 50.0
-"""Sampling rate (Hz) of exported commands."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +69,6 @@ class Experiment:
     """True if its record keeps the genomes of all initial populations, which a page reads."""
     film: bool = False
     """True if its best gait is filmed, for README.md."""
-    exported: bool = False
-    """True if its best gait is exported for a prototype, into the folder EXPORTED."""
     engine: str = "compiled"
 
     def scenario(self, name: str) -> Scenario:
@@ -150,16 +145,13 @@ def publish(
     with timed(name, "pages", out):
         make_folder(made, shown, initial=experiment.initial, whole=whole)
         show(shown, film=experiment.film)
-        if experiment.exported:
-            run = load_run(made)
-            export(run.scenario, run.best_gait(), rate=RATE, out=shown / EXPORTED)
     shutil.copy(analysis, shown / ANALYSIS)
 
 
 def make_folder(made: Path, shown: Path, *, initial: bool = False, whole: bool = False) -> None:
-    """Thins a run into the folder `shown`, in place of its old trials and exported files; or copies
+    """Thins a run into the folder `shown`, in place of its old trials; or copies
     its record, if it is to be `whole`."""
-    for old in (*shown.glob("trial_*"), *shown.glob(EXPORTED)):
+    for old in shown.glob("trial_*"):
         shutil.rmtree(old)
     thin(made, shown, initial=initial, whole=whole)
 

@@ -31,7 +31,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import TextTable, fixed, rounded, uncertain
+from tetra_drake.formatting import fixed, rounded, uncertain
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS, looks_for_turns
@@ -249,20 +249,7 @@ def trials_table(name: str, runs: Runs) -> str:
 def partings_table(name: str, other: str) -> str:
     """Table of where the trials of a run part from the same trials of another run."""
     found = partings(load_run(HERE / name), load_run(HERE / other))
-    columns = ["apart", "farthest", "first_best", "second_best"]
-    counts = found[["evaluations", "alike"]].astype(str)
-    rows = [
-        [f"{trial}", *counts.loc[trial], *map(fixed, numbers)]
-        for trial, numbers in found[columns].iterrows()
-    ]
-    headings = [
-        "trial",
-        "gaits",
-        "the same gaits",
-        "their distances, apart by (in)",
-        "at most (in)",
-    ]
-    return TextTable([*headings, f"`{name}` (in)", f"`{other}` (in)"], rows).markdown()
+    return rendered("partings.md", rows=found, name=name, other=other)
 
 
 def pages(runs: Runs) -> list[Path]:

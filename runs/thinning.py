@@ -9,7 +9,7 @@
 
 Kept gaits are: the best of each trial, gaits evaluated again on the diagram, gaits of a map, and of
 trial 0 the initial population and each gait that was the best so far; with `initial` the initial
-populations of all trials.
+populations of all trials. The fitness of each gait that was the best so far keeps its digits.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ import lzma
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import pandas
 
 from tetra_drake.evolution.entries import (
     BEST_GAIT,
@@ -58,14 +60,16 @@ def thin(source: Path, out: Path, *, initial: bool = False, whole: bool = False)
     cannot be read or written."""
     run = load_run(source)
     manifest = json.loads((source / MANIFEST).read_text(encoding="utf-8")) | {"thinned": not whole}
-    matter = {(int(trial), int(index)) for trial, index in _that_matter(run, initial)}
-    metrics = _that_choose(run.scenario)
+    matter = _that_matter(run, initial)
+    rises, metrics = _keys(_rises(run.evaluations)), _that_choose(run.scenario)
     for trial in range(run.scenario.evolution.trials):
         iterations = _entries(run, ITERATIONS, trial)  # read first: a run may grow meanwhile
         thinned = []
         for entry in _entries(run, EVALUATIONS, trial):
-            reduced = _kept if (trial, entry["index"]) in matter else _thinned
-            kept = entry if whole else reduced(entry, metrics)
+            key = trial, entry["index"]
+            reduced = _kept(entry, metrics) if key in matter else _thinned(entry, metrics)
+            reduced |= {"fitness": entry["fitness"]} if key in rises else {}
+            kept = entry if whole else reduced
             wall_time = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
             thinned.append(kept | {"wall_time_s": wall_time})
         again = [e | {"genome": None} for e in _entries(run, REEVALUATIONS, trial)]
@@ -88,14 +92,23 @@ def _entries(run: Run, name: str, trial: int | None = None) -> list[dict[str, An
     return [line.content() for line in run.file(name, trial).read()]
 
 
-def _that_matter(run: Run, initial: bool) -> set[tuple[Any, Any]]:
+def _rises(evaluations: pandas.DataFrame) -> pandas.DataFrame:
+    """The evaluations of gaits that were the best of their trial so far."""
+    best_so_far = evaluations.groupby("trial")["fitness"].cummax()
+    return evaluations[evaluations["fitness"] == best_so_far]
+
+
+def _keys(table: pandas.DataFrame) -> set[tuple[int, int]]:
+    """Trial and index of evaluations."""
+    return {(int(trial), int(index)) for trial, index in table[["trial", "index"]].to_numpy()}
+
+
+def _that_matter(run: Run, initial: bool) -> set[tuple[int, int]]:
     """Trial and index of the kept gaits; their evaluations keep their genomes."""
-    table = run.evaluations
-    first = table[table["trial"] == 0]
-    is_early = (first["iteration"] == 0) | (first["fitness"] == first["fitness"].cummax())
-    chosen = [first[is_early], run.best(BEST_GAITS), run.reevaluations, elites(run)]
-    chosen += [run.initial()] if initial else []
-    return {(row["trial"], row["index"]) for table in chosen for _, row in table.iterrows()}
+    first = run.evaluations[run.evaluations["trial"] == 0]
+    early = [_rises(first), run.initial() if initial else first[first["iteration"] == 0]]
+    chosen = [*early, run.best(BEST_GAITS), run.reevaluations, elites(run)]
+    return set().union(*map(_keys, chosen))
 
 
 def _that_choose(scenario: Scenario) -> set[str]:

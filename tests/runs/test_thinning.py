@@ -97,6 +97,8 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     before, after = run.evaluations.loc[rest], thinned.evaluations.loc[rest]
     loss = (before["fitness"] - after["fitness"]).dropna()
     assert (loss >= 0.0).all() and (loss < 1e-4).all() and (loss > 0.0).any()
+    is_best = run.evaluations["fitness"] == run.evaluations.groupby("trial")["fitness"].cummax()
+    assert (loss[is_best.loc[loss.index]] == 0.0).all() and (is_best.loc[rest]).any()
     assert [float(f"{x:.3g}") for x in before["twist"].dropna()] == after["twist"].dropna().tolist()
     assert thinned.evaluations["failure"].equals(run.evaluations["failure"])
 
