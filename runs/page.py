@@ -69,7 +69,7 @@ def _environment() -> jinja2.Environment:
     return environment
 
 
-def rendered(name: str, **numbers: object) -> str:
+def rendered(name: str, /, **numbers: object) -> str:
     """The page from the template of a name and numbers. Raises InputError if it has a number that
     is not given."""
     try:
