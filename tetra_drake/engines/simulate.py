@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from tetra_drake.engines.batch import Viewer
-from tetra_drake.engines.engine import check_can_be_watched, engine_of
+from tetra_drake.engines.engine import Viewer, check_can_be_watched, engine_of
 from tetra_drake.engines.queue import SimulationQueue
-from tetra_drake.engines.simulation import Controller, Simulation
-from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.command import Command, Driver, driven_robot
+from tetra_drake.robot.command import (
+    Command,
+    Controller,
+    Driver,
+    driven_robot,
+    robot_of_controller,
+)
 from tetra_drake.robot.gait import GivenGait, given_gait, seeded_gait
 from tetra_drake.robot.network import SteeringSignal, constant_steering
 from tetra_drake.robot.robot import Robot
@@ -70,18 +73,8 @@ def simulate(
     if controller is not None:
         if gait is not None or command is not None or steering is not None:
             raise InputError("simulate", "controller", "excludes a gait, a command, and steering")
-        simulation = Simulation(
-            scenario,
-            control_period=control_period,
-            record=record,
-            viewer=viewer,
-            name=getattr(controller, "__name__", "controller"),
-        )
-        while not simulation.ended[0]:
-            check_time()
-            readings = simulation.state.rows(0)
-            simulation.step(controller(float(readings.time), readings))
-        return simulation.result()
+        robot = robot_of_controller(scenario, controller, period=control_period)
+        return engine_of(scenario).simulate(robot, record=record, viewer=viewer)
     if command is not None and (gait is not None or steering is not None):
         raise InputError("simulate", "command", "excludes a gait, and steering")
     given = gait if command is None else command
