@@ -35,7 +35,8 @@ class Viewer(Protocol):
 
 
 class Engine:
-    """Base class of engines, which simulate robots from start to end."""
+    """Base class of engines, which simulate robots from start to end. Subclasses implement
+    simulate()."""
 
     lanes: ClassVar[int] = 1
     """Number of robots that one thread simulates side by side: more than one on the compiled

@@ -45,7 +45,8 @@ def simulate(
         >>> inches, tension = result.metrics.distance_in, result.trajectory.tension
 
     The same scenario and gait always give the same numbers, bit for bit, except for the wall time.
-    Recording and watching do not change them.
+    Recording and watching do not change them. On each engine, a policy or a controller acts once in
+    each control period, and the robot changes at the events of the scenario.
 
     Args:
         scenario: a scenario, its name or file, or a run.

@@ -93,8 +93,8 @@ class Simulation:
             InputError: if an argument does not fit the scenario, or its engine is another one.
         """
         self.scenario = scenario = given_scenario(scenario)
-        advice = "scenario.on_engine('compiled') steps robots; here simulate(controller=...)"
-        check_engine(scenario, "compiled", advice)
+        advice = "use on_engine('compiled'), or simulate(controller=...)"
+        check_engine(scenario, "compiled", f"no other engine steps robots; {advice}")
         self.robot: Robot = controlled_robot(scenario)
         """The robot without disturbances. Its structure has the names of nodes and cables."""
         self._first_readings = first_readings(self.robot)
