@@ -22,7 +22,7 @@ from PIL import Image
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
-from tetra_drake.visualization.browser import do, launch_browser, picture_of, wait_until_loaded
+from tetra_drake.lab.films.browser import do, launch_browser, picture_of, wait_until_loaded
 from tetra_drake.visualization.scene import COLOURS
 
 if TYPE_CHECKING:

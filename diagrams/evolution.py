@@ -13,7 +13,7 @@ from block_diagram import OUT
 import tetra_drake as td
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.optimizers import Evaluation, optimizer_of
-from tetra_drake.robot.gait import AnyGait
+from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -21,7 +21,7 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 SCENARIO, X = td.load_scenario("quick"), 4  # the rear tetrahedron's x in the state [q; v]
 
 
-def distance(robot: Robot, gait: AnyGait) -> float:
+def distance(robot: Robot, gait: Gait) -> float:
     """Way (m) of a gait: cables, ground and MatsuokaCpg around a plant, with error control."""
     diagram = MakeTensegrityDiagram(robot, gait)
     simulator = MakeSimulator(diagram, robot, Drake())
@@ -33,7 +33,7 @@ def distance(robot: Robot, gait: AnyGait) -> float:
 def main(evaluations: int = 28) -> None:
     """Searches, prints each generation and writes the page."""
     robot, space = Robot.of(SCENARIO), td.ParameterSpace.of(SCENARIO)
-    gaits, ways = list[AnyGait](), list[float]()
+    gaits, ways = list[Gait](), list[float]()
     search = optimizer_of(SCENARIO.optimizer)(space, SCENARIO.evolution, np.random.default_rng(0))
     while len(ways) < evaluations:
         asked = [space.gait(vector, name="evolved") for vector in search.ask()]

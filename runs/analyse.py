@@ -30,7 +30,8 @@ from tetra_drake.laws.terrain import Flat, Rough
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import AnyGait, ParameterSpace
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
@@ -204,7 +205,7 @@ def _turned(scenario: Scenario) -> list[str]:
     return [TURNED] if looks_for_turns(scenario.objective) else []
 
 
-def sensitivity(scenario: Scenario, gaits: Sequence[AnyGait], workers: int) -> list[float]:
+def sensitivity(scenario: Scenario, gaits: Sequence[Gait], workers: int) -> list[float]:
     """Sensitivity of each gait to its start: the largest change (in) of its distance on the
     compiled engine. Every body starts displaced by DISPLACEMENT, in WAYS random directions. NaN if
     a simulation fails."""
@@ -231,7 +232,7 @@ def sensitivity(scenario: Scenario, gaits: Sequence[AnyGait], workers: int) -> l
 
 def resimulate(
     scenario: Scenario,
-    gaits: Mapping[int, AnyGait],
+    gaits: Mapping[int, Gait],
     workers: int,
     executor: MakeExecutor | None,
 ) -> list[dict[str, Any]]:
@@ -253,7 +254,7 @@ def resimulate(
 
 
 def on_unseen_ground(
-    scenario: Scenario, gaits: Mapping[int, AnyGait], workers: int
+    scenario: Scenario, gaits: Mapping[int, Gait], workers: int
 ) -> list[dict[str, Any]]:
     """Table of the gaits on random ground with UNSEEN seeds; see Analysis. Empty if the scenario's
     ground is not random."""

@@ -35,7 +35,7 @@ from tetra_drake.formatting import TextTable, fixed, listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.laws.curves import travelling_index
 from tetra_drake.machine import versions
-from tetra_drake.robot.gait import AnyGait
+from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.measures import dominant_frequency, off_ground
 from tetra_drake.scenario.metrics import Metrics
 from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
@@ -166,7 +166,7 @@ def asymmetry(trajectory: xarray.Dataset) -> float:
 # The record
 
 
-def simulated(run: Run, gait: AnyGait, period: str) -> tuple[Metrics, xarray.Dataset]:
+def simulated(run: Run, gait: Gait, period: str) -> tuple[Metrics, xarray.Dataset]:
     """Metrics of a gait of a run, and its trajectory from `simulation.steady_from` on. `period` is
     the time between samples."""
     scenario = run.scenario.with_changes({"simulation.sample_period": period})
@@ -175,7 +175,7 @@ def simulated(run: Run, gait: AnyGait, period: str) -> tuple[Metrics, xarray.Dat
     return result.metrics, result.trajectory.sel(time=slice(start, None))
 
 
-def of_best(run: Run, gait: AnyGait) -> dict[str, Any]:
+def of_best(run: Run, gait: Gait) -> dict[str, Any]:
     """The numbers of a best gait, by tetrahedron or pair of cables from the rear where they differ;
     also the least gap of struts (in) and tension (lbf)."""
     metrics, trajectory = simulated(run, gait, "5 ms")
@@ -187,7 +187,7 @@ def of_best(run: Run, gait: AnyGait) -> dict[str, Any]:
     return found | travel(trajectory) | rotation(trajectory)
 
 
-def of_initial(run: Run, gait: AnyGait) -> dict[str, Any]:
+def of_initial(run: Run, gait: Gait) -> dict[str, Any]:
     """Distance (in) of an initial gait in the steady walk, and share of feet that lag behind the
     foot before; empty as rhythm()."""
     metrics, trajectory = simulated(run, gait, "10 ms")

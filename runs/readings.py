@@ -175,7 +175,7 @@ def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
         "backward": (initial["distance"] < 0.0).mean(),
         "best_in": best["distance_in"],
         "farthest_in": made["distance_in"].max(),
-        "tau_a_s": best["tau_a_s"],
+        "tau_a_s": best["tau_A"],
         "initial_mean": means[0],
         "mean_200": means[min(last, settings.stop_after)],
         "mean": means[last],

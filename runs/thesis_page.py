@@ -77,7 +77,7 @@ def over_trials(values: pandas.Series, digits: int = 2) -> str:
 def two_best(run: Run, trial: int) -> pandas.Series:
     """Absolute differences of fitness and parameters of the two best gaits of a trial's last
     population, as in Table 8. Gaits with the same parameters count once."""
-    members = last_population(run, trial).filter(regex="^(fitness$|weight_|tau_)")
+    members = last_population(run, trial).filter(regex="^(fitness$|weight |tau_)")
     best = members.drop_duplicates(members.columns[1:]).nlargest(2, "fitness")
     return best.diff().iloc[1].abs()
 
@@ -89,7 +89,7 @@ def weights_pattern(run: Run) -> dict[str, str]:
     Table 5. Shuffled weights of each gait tell how much the weights' means differ by chance.
     """
     gait_bounds, generator = run.scenario.gait_bounds, np.random.default_rng(0)
-    weights = run.best().filter(like="weight_")
+    weights = run.best().filter(like="weight ")
     low, high = gait_bounds.weight_min, gait_bounds.weight_max
     random = generator.uniform(low, high, (DRAWS, *weights.shape)).std(axis=1, ddof=1)
     means, table = weights.mean(), weights.to_numpy()
@@ -138,17 +138,17 @@ def trials_numbers(run: Run) -> dict[str, Any]:
         "seconds": rounded(seconds, 2),
         "faster": f"{round(2.0 * duration / seconds, -2):,.0f}",
         "trial_seconds": over_trials(seconds * iterations, 0),
-        "tau": over_trials(best["tau_a_s"], 3),
+        "tau": over_trials(best["tau_A"], 3),
         "hertz": over_trials(hertz),
         "hertz_of_best": fixed(hertz[trial]),
         "swing": fixed(np.ptp(signals[trial]) / POUND_FORCE),
         "least_tension": fixed(best["tension"].min() / POUND_FORCE),
         "signal_rate": over_trials(best["signal_rate"] / POUND_FORCE, 1),
         "twist": f"{best[['twist', 'lateral_drift']].to_numpy().max() / INCH:.0e}",
-        "same_tau": int((pairs["tau_a_s"] == 0.0).sum()),
+        "same_tau": int((pairs["tau_A"] == 0.0).sum()),
         "fitness_apart": over_trials(pairs["fitness"], 3),
-        "weights_apart": fixed(pairs.loc[trial].filter(like="weight_").max()),
-        "pair": pairs.loc[trial].to_dict(),
+        "weights_apart": fixed(pairs.loc[trial].filter(like="weight ").max()),
+        "pair": dict(enumerate(pairs.loc[trial])),  # fitness, weights, time constants
         **weights_pattern(run),
     }
 

@@ -18,7 +18,7 @@ from helpers.brief import BRIEF
 import tetra_drake as td
 from tetra_drake.errors import InputError
 from tetra_drake.report.result_folder import save_result_folder
-from tetra_drake.robot.gait import save_gait
+from tetra_drake.robot.gait_file import save_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -119,7 +119,10 @@ def test_a_run_stands_for_its_scenario_and_its_best_gait():
         (lambda: td.robustness("quick", 5), ("gait", "")),
         (lambda: td.export("quick", td.seeded_gait("quick"), "a", rate="3"), ("export", "rate")),
         (lambda: td.ParameterSpace.of("quick").repair([1.0]), ("ParameterSpace", "vector")),
-        (lambda: td.ParameterSpace.of("quick").gait([-1.0] * 26, name="g"), ("gait g", "")),
+        (
+            lambda: td.ParameterSpace.of("quick").gait([-1.0] * 26, name="g"),
+            ("gait g", "weight 2->1 extensor"),
+        ),
     ],
 )
 def test_an_argument_that_stands_for_nothing_is_named(call, named):

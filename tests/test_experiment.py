@@ -229,7 +229,7 @@ def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeyp
 def test_what_hardly_acts_sinks_or_has_no_diagram_is_named(tiny, tmp_path, reports, monkeypatch):
     """The first two at the start, the last at the end."""
     monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: in_threads())
-    monkeypatch.setattr("tetra_drake.study.spread.record_spread", lambda *_, **__: None)
+    monkeypatch.setattr("tetra_drake.lab.spread.record_spread", lambda *_, **__: None)
     progress, out = MagicMock(spec=Progress), tmp_path / "run"
     changes = {"simulation.duration": "3000 s", "cpg.gain": "0.1 N", "ground.stiffness": "20 N/m"}
     odd = tiny.with_changes(changes)

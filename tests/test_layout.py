@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -16,10 +17,11 @@ import tetra_drake
 
 PACKAGE = Path(tetra_drake.__file__).parent
 ROWS = [
-    ["errors", "files", "formatting", "interrupts", "machine"],
+    ["errors", "files", "formatting", "interrupts", "machine", "on_demand"],
     ["kernels", "settings", "laws", "scenario", "options", "robot"],
-    ["systems", "visualization", "results", "engines", "gym", "prototype"],
-    ["optimizers", "evolution", "figures", "study", "report", "experiment", "cli"],
+    ["systems", "visualization", "results", "engines"],
+    ["optimizers", "evolution", "figures", "study", "report", "experiment"],
+    ["command_options", "cli", "lab", "gym"],
 ]
 ORDER = [name for row in ROWS for name in row]
 """A folder, or a module beside the folders, imports only those before it."""
@@ -69,6 +71,29 @@ def test_data_flows_one_way() -> None:
         place = ORDER.index(name.split(".")[0])
         upward = [other for other in imported if ORDER.index(other.split(".")[0]) > place]
         assert not upward, f"{name} imports {upward}"
+
+
+def test_the_core_never_imports_the_lab() -> None:
+    doors = {"gym"}  # users import this module
+    for name, imported in modules().items():
+        if name.split(".")[0] not in {"lab"} | doors:
+            assert not [other for other in imported if other.split(".")[0] == "lab"], name
+
+
+def test_a_simulation_loads_nothing_of_the_lab() -> None:
+    lines = ["import sys, tetra_drake as td", "td.simulate, td.evolve", "print(*sys.modules)"]
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
+    assert "tetra_drake.engines.simulate" in done.stdout.split()
+    assert not [name for name in done.stdout.split() if name.startswith("tetra_drake.lab")]
+
+
+def test_the_drawing_of_the_house_has_all_folders_in_their_order() -> None:
+    drawing = (PACKAGE / "house.svg").read_text(encoding="utf-8")
+    drawn = " ".join(re.findall(r'class="name">([^<]+)<', drawing)).split()
+    folders = {f"{file.parent.name}/" for file in PACKAGE.glob("*/__init__.py")}
+    assert folders <= {*drawn}
+    core = [ORDER.index(name.removesuffix(".py").rstrip("/")) for name in drawn if name != "lab/"]
+    assert core == sorted(core)
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:

@@ -51,23 +51,22 @@ names and their modules are in `__init__.pyi`, which type checkers read, too.
 
 from __future__ import annotations
 
-import importlib
-import re
 from pathlib import Path
 from typing import Any
 
+from tetra_drake.on_demand import loaded, places
+
 __version__ = "0.5.0"
 
-_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-_MODULES = {name: module for module, name in re.findall(r"from (\S+) import (\w+)", _STUB)}
+_PLACES = places(Path(__file__))
 
-__all__ = ["__version__", *_MODULES]
+__all__ = ["__version__", *_PLACES]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
+    if name not in _PLACES:
         raise AttributeError(f"module 'tetra_drake' has no attribute '{name}'")
-    return getattr(importlib.import_module(_MODULES[name]), name)
+    return loaded(_PLACES[name])
 
 
 def __dir__() -> list[str]:

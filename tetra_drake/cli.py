@@ -9,26 +9,46 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from tetra_drake import __version__
+from tetra_drake.command_options import (
+    Cluster,
+    CommandFile,
+    Count,
+    EngineName,
+    File,
+    Folder,
+    FontSize,
+    GaitOrRun,
+    GaitPath,
+    GaitSeed,
+    Labels,
+    Rate,
+    ResultOrGait,
+    RunOrResult,
+    ScenarioName,
+    Seed,
+    StructureName,
+    UnitName,
+    Width,
+    print_of,
+    say,
+    scenario_and_gait,
+    warn,
+)
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import check_folder, file_names, write_whole
+from tetra_drake.files import check_folder, write_whole
 from tetra_drake.interrupts import heeding_interrupts
-from tetra_drake.options import BAD_INPUT, Option, Parser, integer, number, quantity, size
-from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
+from tetra_drake.on_demand import loaded
+from tetra_drake.options import BAD_INPUT, Parser
 from tetra_drake.settings.units import INCH, SYSTEMS, shown_in
 
 if TYPE_CHECKING:
-    from tetra_drake.figures.style import Print
-    from tetra_drake.robot.gait import AnyGait
     from tetra_drake.scenario.scenario import Scenario
 
 FAILED, INTERRUPTED = 1, 130  # exit statuses beside BAD_INPUT
-
-_say = partial(print, flush=True)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -77,65 +97,17 @@ def make_parser() -> Parser:
     commands: list[Callable[..., None]] = [
         _simulate,
         _evolve,
-        _export,
         _replay,
-        _video,
         _figures,
         _robustness,
-        _compare,
-        _fit,
-        _predict,
         _cpg,
         _structure,
         _schema,
         _prepare,
+        *loaded("tetra_drake.lab.commands:COMMANDS"),
     ]
     parser.add_commands(commands, common=common)
     return parser
-
-
-Folder = Annotated[Path, Option(metavar="DIR", type=Path)]
-File = Annotated[Path, Option(metavar="FILE", type=Path)]
-Count = Annotated[int, Option(metavar="N", type=partial(integer, least=1))]
-Seed = Annotated[int, Option(metavar="N", type=partial(integer, least=0))]
-Rate = Annotated[
-    float, Option(metavar="RATE", type=quantity("Hz", "100 Hz", least="0.001 Hz", most="1 MHz"))
-]
-Reach = Annotated[
-    float,
-    Option(metavar="LENGTH", type=quantity("m", "14.34 in", least="0.001 mm", most="1000 km")),
-]
-Width = Annotated[
-    float, Option(metavar="LENGTH", type=quantity("m", "3.4 in", least="2 in", most="40 in"))
-]
-UnitName = Annotated[str, Option(metavar="UNIT")]
-Size = Annotated[tuple[int, int], Option(metavar="WxH", type=size)]
-FontSize = Annotated[float, Option(metavar="X", type=partial(number, least=2, most=40))]
-FrameRate = Annotated[float, Option(metavar="X", type=partial(number, least=0.01, most=240))]
-PlaybackSpeed = Annotated[float, Option(metavar="X", type=partial(number, least=0.001, most=1000))]
-View = Annotated[str, Option(choices=("free", "side", "front", "top"))]
-Cluster = Annotated[str, Option(metavar="ADDRESS", nargs="?", const="")]
-Quantities = Annotated[list[str], Option(metavar="QUANTITY", nargs="+")]
-Labels = Annotated[list[str], Option(metavar="NAME", nargs="+")]
-RunFolder = Annotated[Folder, Option(metavar="RUN")]
-GaitOrRun = Annotated[Path, Option(metavar="GAIT|RUN", type=Path)]
-RunOrResult = Annotated[Path, Option(metavar="RUN_DIR|RESULT_DIR", type=Path)]
-ResultOrGait = Annotated[Path, Option(metavar="RESULT_DIR|GAIT|RUN_DIR", type=Path)]
-
-_SCENARIO = f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file"
-_GAIT = "a gait file (JSON), or a folder written by `evolve` for its best gait"
-_SEED = "a random gait of this seed instead (default: one that walks)"
-_STRUCTURE = f"a structure or MJCF file, one of {', '.join(shipped_structures())}, or a scenario"
-_COMMAND = "a file of actuator commands (CSV) instead, as `export` writes"
-_ENGINE = "drake (the diagram), compiled (the same laws), or mujoco (default: the scenario's)"
-
-FitPath = Annotated[Path, Option(metavar="FIT", type=Path)]
-ScenarioName = Annotated[str, Option(_SCENARIO, metavar="NAME|FILE")]
-GaitPath = Annotated[Path, Option(_GAIT, metavar="FILE|RUN", type=Path, group="gait")]
-GaitSeed = Annotated[Seed, Option(_SEED, group="gait")]
-CommandFile = Annotated[File, Option(_COMMAND, group="gait")]
-EngineName = Annotated[str, Option(_ENGINE, metavar="NAME")]
-StructureName = Annotated[str, Option(_STRUCTURE, metavar="NAME|FILE|SCENARIO")]
 
 
 def _simulate(
@@ -165,20 +137,19 @@ def _simulate(
     """
     from tetra_drake.engines.engine import check_can_be_watched, engine_of
     from tetra_drake.engines.simulate import simulate
-    from tetra_drake.prototype.command_file import load_command, scenario_beside
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
+    from tetra_drake.robot.command_file import load_command, scenario_beside
     from tetra_drake.scenario.load import load_scenario
-    from tetra_drake.study.spread import spread as spread_of
 
     played = None
     if command is None:
-        chosen, chosen_gait = _chosen_gait(scenario, gait, seed, engine)
+        chosen, chosen_gait = scenario_and_gait(scenario, gait, seed, engine)
     else:
         beside = scenario_beside(command)
         chosen = load_scenario(scenario or beside or "thesis").on_engine(engine)
         if scenario and beside:
-            _warn(f"{command}: simulated on scenario {chosen.name}, not on {beside} beside it")
+            warn(f"{command}: simulated on scenario {chosen.name}, not on {beside} beside it")
         chosen_gait, played = None, load_command(command, chosen)
     if meshcat:
         check_can_be_watched(chosen)
@@ -188,11 +159,13 @@ def _simulate(
     if meshcat:
         from tetra_drake.visualization.live import open_view
 
-        view = open_view(chosen, say=_say)
+        view = open_view(chosen, say=say)
     result = simulate(chosen, chosen_gait, command=played, record=True, viewer=view)
     driver = played or chosen_gait
     if spread and driver is not None:
-        result = dataclasses.replace(result, spread=spread_of(chosen, driver))
+        result = dataclasses.replace(
+            result, spread=loaded("tetra_drake.lab.spread:spread")(chosen, driver)
+        )
     print(result_text(result))
     save_result_folder(out, result)
     print(
@@ -202,35 +175,6 @@ def _simulate(
     if view is not None:
         with contextlib.suppress(EOFError, KeyboardInterrupt):
             input("press Enter to close the view in the browser ")
-
-
-def _export(
-    gait: GaitPath | None = None,
-    *,
-    seed: GaitSeed | None = None,
-    scenario: ScenarioName | None = None,
-    engine: EngineName | None = None,
-    rate: Rate = 100.0,
-    out: Folder,
-) -> None:
-    """Write a gait as commands for the actuators of a prototype.
-
-    Simulates a gait and writes command.csv (setpoints of each actuator), expected.csv (positions of
-    the nodes), limits.csv (the load on each actuator), scenario.yaml and README.md. Prints whether
-    the scenario's actuators can follow these commands, and how far the robot walks with them.
-
-    Args:
-        scenario: (default: the scenario of the gait's run; thesis for a gait in no run)
-        rate: samples per second (default: 100 Hz)
-        out: the new folder to write
-
-    Example: tetra-drake export runs/motors --out lab
-    """
-    from tetra_drake.prototype.export import export
-
-    chosen, chosen_gait = _chosen_gait(scenario, gait, seed, engine)
-    print(export(chosen, chosen_gait, rate=rate, out=out))
-    print(f"wrote {out}/")
 
 
 def _evolve(
@@ -288,8 +232,7 @@ def _evolve(
 
     executor: contextlib.AbstractContextManager[Any] = contextlib.nullcontext()
     if dask is not None:
-        from tetra_drake.evolution.cluster import dask_cluster
-
+        dask_cluster = loaded("tetra_drake.lab.cluster:dask_cluster")
         executor = dask_cluster(dask or None, workers=workers)
     try:
         with executor as make_executor:
@@ -328,44 +271,8 @@ def _replay(source: ResultOrGait, *, scenario: ScenarioName | None = None, out: 
     """
     from tetra_drake.report.result_folder import write_replay
 
-    title = write_replay(source, out, scenario=scenario, warn=_warn)
+    title = write_replay(source, out, scenario=scenario, warn=warn)
     print(f"{title}\nto watch the robot, open in a browser: {out}")
-
-
-def _video(
-    source: ResultOrGait,
-    *,
-    scenario: ScenarioName | None = None,
-    size: Size = (1920, 1080),
-    fps: FrameRate = 30.0,
-    view: View = "free",
-    speed: PlaybackSpeed = 1.0,
-    out: File,
-) -> None:
-    """Write a video of a gait, for talks.
-
-    Draws the frames of the replay page in a headless browser, without texts; the camera follows the
-    robot. It needs Chromium or Chrome, and the Python packages playwright and imageio-ffmpeg. A
-    frame takes about a second without a graphics card.
-
-    Args:
-        source: a folder written by `simulate`, a gait file, or a folder written by `evolve`
-        scenario: (default: the scenario of its run, or thesis; for gait files only)
-        size: (default: 1920x1080)
-        fps: frames per second (default: %(default)s)
-        view: (default: %(default)s)
-        speed: speed as a multiple of the robot's (default: %(default)s)
-        out: the file to write, .mp4 or .gif
-
-    Example: tetra-drake video runs/champion --out talk.mp4 --view side
-    """
-    from tetra_drake.report.result_folder import load_or_simulate
-    from tetra_drake.visualization.video import check_video
-
-    check_video(out, fps=fps)
-    result = load_or_simulate(source, scenario=scenario, warn=_warn)
-    result.save_video(out, size=size, fps=fps, view=view, speed=speed, say=_say)
-    print(f"{result.title}\nwrote {out}")
 
 
 def _figures(
@@ -395,7 +302,7 @@ def _figures(
     """
     from tetra_drake.report.run_page import write_figures
 
-    written = write_figures(source, out, _print(width, font, title=title, pdf=pdf))
+    written = write_figures(source, out, print_of(width, font, title=title, pdf=pdf))
     print(f"wrote {', '.join(str(path) for path in written)}")
 
 
@@ -428,161 +335,13 @@ def _robustness(
     from tetra_drake.evolution.run import load_source
     from tetra_drake.study.robustness import robustness, robustness_text, save_judgement
 
-    found = load_source(source, scenario=scenario, warn=_warn)
+    found = load_source(source, scenario=scenario, warn=warn)
     if out:
         check_folder(out)
     judgement = robustness(found.scenario, found.gaits, draws=draws, seed=seed, workers=workers)
     print(robustness_text(judgement))
     if out:
         print(f"wrote {', '.join(save_judgement(judgement, out))} to {out}/")
-
-
-def _compare(
-    runs: list[RunFolder],
-    *,
-    labels: Labels | None = None,
-    scenarios: bool = False,
-    reach: Reach | None = None,
-    width: Width = 7.0 * INCH,
-    font: FontSize = 9.0,
-    title: bool = True,
-    pdf: bool = False,
-    out: Folder | None = None,
-) -> None:
-    """Compare how well runs search.
-
-    Compares the best fitness of each trial at the same number of simulations. An evaluation is
-    one simulation, or one for each draw of disturbances. Prints interquartile means with bootstrap
-    intervals, the probability that a trial of one run ends fitter than a trial of another with its
-    interval, simulations until a trial reaches a distance, and time. With --out it writes
-    trials.csv, curves.csv, summary.json and the figure comparison.
-
-    Args:
-        runs: folders written by `evolve`, finished or not, all with the same objective
-        labels: names of the runs in tables and figures, one for each (default: of the folders)
-        scenarios: compare the runs of each scenario, by its name; equal labels stand for one method
-        width: width of the figure (default: 7 in)
-        font: size of the figure's letters in points (default: %(default)s)
-        title: draw without title
-        pdf: also write a PDF file
-        reach: also count simulations until a trial walks this distance, such as '14.34 in'
-        out: write tables (CSV, JSON) and the figure into this folder
-
-    Example: tetra-drake compare runs/thesis runs/cma-es --reach "14.34 in"
-    """
-    from tetra_drake.study.comparison import (
-        compare,
-        compare_scenarios,
-        comparison_text,
-        improvement_over,
-        improvement_text,
-        save_comparison,
-    )
-
-    printed = _print(width, font, title=title, pdf=pdf)
-    if out:
-        check_folder(out)
-    if scenarios:
-        by_scenario = compare_scenarios(runs, reach=reach, labels=labels)
-    else:
-        by_scenario = {"": compare(runs, reach=reach, labels=labels)}
-    folders = file_names(by_scenario) if scenarios else {"": ""}
-    for name, compared in by_scenario.items():
-        print(f"\nScenario {name}:\n" if name else "", comparison_text(compared), sep="")
-        if out:
-            written = save_comparison(compared, out / folders[name], printed)
-            print(f"wrote {', '.join(written)} to {out / folders[name]}/")
-    if len(by_scenario) > 1:
-        means = improvement_over(compared.trials for compared in by_scenario.values())
-        print(f"\nMean over {len(by_scenario)} scenarios:\n\n{improvement_text(means)}")
-
-
-def _fit(
-    source: FitPath,
-    *,
-    scenario: ScenarioName | None = None,
-    search: bool = False,
-    out: Folder = Path("fit"),
-) -> None:
-    """Fit values of a scenario to measurements.
-
-    Reads a YAML file with `parameters`, scenario keys with bounds, and `measurements`: a
-    !MotionCapture has a log of positions over time, a !Rest has positions, tensions and frequencies
-    at rest. Finds the values for which the simulation meets the measurements, with 95 percent
-    intervals. Writes the fitted scenario.yaml, tables, the figure of the residuals, and the page
-    fit.html, also as README.md.
-    After Ctrl-C the same command goes on.
-
-    Args:
-        source: the file of the fit
-        scenario: (default: scenario.yaml beside the file, or thesis)
-        search: first search all values within the bounds, by CMA-ES; a few hundred simulations
-        out: the folder to write to (default: %(default)s)
-
-    Example: tetra-drake fit lab/fit.yaml --scenario prism --out fit
-    """
-    from tetra_drake.experiment import fit
-    from tetra_drake.prototype.command_file import scenario_beside
-    from tetra_drake.scenario.load import load_scenario
-    from tetra_drake.study.measurements import load_fit_file
-
-    given = load_fit_file(source)
-    measurements, parameters = given.measurements, given.parameters
-    chosen = load_scenario(scenario or scenario_beside(source) or "thesis")
-    try:
-        found = fit(
-            chosen, measurements, parameters, search=search, out=out, say=_say, source=source
-        )
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt("(nothing is lost; the same command goes on)") from None
-    print(f"{found}\nwrote scenario.yaml, tables, figure, README.md and fit.html to {out}/")
-    print(f"to see the fit, open in a browser: {out / 'fit.html'}")
-
-
-def _predict(
-    source: StructureName,
-    *,
-    quantities: Quantities | None = None,
-    gait: GaitPath | None = None,
-    command: CommandFile | None = None,
-    draws: Count = 200,
-    seed: Seed = 0,
-    out: Folder | None = None,
-) -> None:
-    """Predict quantities with intervals, from the tolerances of a robot's numbers.
-
-    Draws robots whose numbers differ within the `tolerances` of the file. Prints the median and the
-    90 percent interval of each quantity, and which tolerance makes how much of its variance. Names
-    of quantities: 'frequency 1', 'n3 z' (a node at rest), 'tension side n0 n3' or 'tension side'
-    (mean of a group; also length, force_density), and with a gait or a command any metric, such as
-    speed.
-
-    Args:
-        quantities: (default: three frequencies and mean tensions; with a gait or a command,
-            distance and speed)
-        draws: number of draws (default: %(default)s)
-        seed: random seed of the draws (default: %(default)s)
-        out: write the page predict.html, tables, figure and scenario into this folder
-
-    Example: tetra-drake predict my.yaml --quantities 'n3 z' --out out
-    """
-    from tetra_drake.prototype.command_file import load_command
-    from tetra_drake.scenario.load import load_scenario
-    from tetra_drake.scenario.structure_files import names_scenario
-    from tetra_drake.study.equilibrium import robot_of_file
-    from tetra_drake.study.predict import predict
-
-    is_scenario = names_scenario(source)
-    scenario = load_scenario(source) if is_scenario else robot_of_file(source).scenario
-    played = None if command is None else load_command(command, scenario)
-    if quantities is None:
-        groups = dict.fromkeys(scenario.robot.blueprint().cable_groups)
-        at_rest = [*(f"frequency {mode}" for mode in (1, 2, 3)), *(f"tension {g}" for g in groups)]
-        quantities = at_rest if gait is None and command is None else ["distance", "speed"]
-    driver: dict[str, Any] = {"gait": gait, "command": played}
-    print(predict(scenario, quantities, **driver, draws=draws, seed=seed, out=out))
-    if out:
-        print(f"to see the predictions, open in a browser: {out / 'predict.html'}")
 
 
 def _cpg(
@@ -610,7 +369,7 @@ def _cpg(
     from tetra_drake.robot.robot import Robot
     from tetra_drake.robot.signals import save_signals
 
-    chosen, chosen_gait = _chosen_gait(scenario, gait, seed)
+    chosen, chosen_gait = scenario_and_gait(scenario, gait, seed)
     save_signals(out, Robot.of(chosen), chosen_gait, rate=rate)
 
 
@@ -618,6 +377,7 @@ def _structure(
     source: StructureName,
     *,
     unit: UnitName | None = None,
+    without: Labels | None = None,
     out: File | None = None,
     mode: Count | None = None,
     mjcf: File | None = None,
@@ -632,6 +392,7 @@ def _structure(
 
     Args:
         unit: unit of length of the file's bare coordinates, such as dm; files of NTRT need it
+        without: bodies of an MJCF file to leave out
         out: write an HTML page that shows the structure in equilibrium; a name that ends in .yaml
             writes a structure file instead, such as one converted from MJCF
         mode: show in --out only the mode with damping that has this number
@@ -641,10 +402,14 @@ def _structure(
     Example: tetra-drake structure six_bar --out six_bar.html
     """
     from tetra_drake.engines.mjcf import loose_remark, make_mjcf
-    from tetra_drake.robot.sdf import make_sdf
-    from tetra_drake.scenario.structure_files import read_structure, save_structure
+    from tetra_drake.scenario.structure_files import (
+        foreign_format,
+        read_structure,
+        save_structure,
+    )
     from tetra_drake.study.equilibrium import (
         robot_of_file,
+        robot_of_structure,
         save_structure_page,
         structure_text,
         study_equilibrium,
@@ -652,11 +417,17 @@ def _structure(
 
     if mode is not None and (out is None or out.suffix in (".yaml", ".yml")):
         raise InputError("structure", "--mode", "needs --out, a page")
+    structure = None
+    if foreign_format(source) or without:
+        convert = loaded("tetra_drake.lab.bridges.conversion:converted")
+        structure = convert(Path(source), unit=unit, without=without or ())
     if out and out.suffix in (".yaml", ".yml"):
-        save_structure(read_structure(source, unit=unit), out, source=source)
-        _say(f"wrote {out}")
-        source, unit, out = str(out), None, None
-    study = study_equilibrium(robot_of_file(source, unit=unit))
+        structure = structure or read_structure(source, unit=unit)
+        save_structure(structure, out, source=source)
+        say(f"wrote {out}")
+        source, out = str(out), None
+    whole = robot_of_structure(structure, source) if structure else robot_of_file(source, unit=unit)
+    study = study_equilibrium(whole)
     text, robot = structure_text(study), study.robot
     rest = robot.equilibrium.state
     if out:
@@ -666,8 +437,9 @@ def _structure(
         write_whole(mjcf, make_mjcf(robot, rest=rest))
         text += f"\nwrote {mjcf}"
         if remark := loose_remark(robot):
-            _warn(remark)
+            warn(remark)
     if sdf:
+        make_sdf = loaded("tetra_drake.lab.bridges.sdf:make_sdf")
         write_whole(sdf, make_sdf(robot.structure, rest, name=robot.scenario.name))
         text += f"\nwrote {sdf}"
     print(text)
@@ -706,33 +478,3 @@ def _prepare() -> None:
     with Progress(sys.stdout) as display:
         prepare(lambda: display.stage(title, min(next(numbers), FUNCTIONS - 1), FUNCTIONS))
         display.stage(title, FUNCTIONS, FUNCTIONS)
-
-
-def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:
-    """Settings for the files of figures, from options of a command. The width is in m, the size of
-    letters `font` in points. `pdf` adds PDF to the file types."""
-    from tetra_drake.figures.style import FILE_KINDS, Look, Print
-
-    look = Look(width_in=width / INCH, font_size=font, title=title)
-    return Print(look, kinds=[*FILE_KINDS, "pdf"] if pdf else FILE_KINDS)
-
-
-def _chosen_gait(
-    scenario: str | None, gait: Path | None, seed: int | None, engine: str | None = None
-) -> tuple[Scenario, AnyGait]:
-    """The scenario, with the named engine, and the gait that a command simulates, from its options.
-    `gait` is a gait file or the folder of a run. Without it, the gait is random, by `seed` or by a
-    seed that walks. The scenario has the body that evolved with the gait, if any."""
-    from tetra_drake.evolution.run import load_source
-    from tetra_drake.robot.gait import WALKING_SEED, seeded_gait, with_body
-    from tetra_drake.scenario.load import load_scenario
-
-    if gait is None:
-        chosen = load_scenario(scenario or "thesis").on_engine(engine)
-        return chosen, seeded_gait(chosen, WALKING_SEED if seed is None else seed)
-    source = load_source(gait, scenario=scenario, warn=_warn)
-    return with_body(source.scenario.on_engine(engine), source.best)
-
-
-def _warn(text: str) -> None:
-    print(f"tetra-drake: {text}", file=sys.stderr, flush=True)

@@ -1,39 +1,38 @@
-"""Complete experiments, from the search to the report: `evolve` and `fit`."""
+"""Complete experiments, from the search to the report."""
 
 from __future__ import annotations
 
 import contextlib
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING
 
 from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.evolution import reevaluation
-from tetra_drake.evolution.cluster import GivenExecutor, maker_of
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
-from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
+from tetra_drake.evolution.evaluators import (
+    GivenExecutor,
+    MakeExecutor,
+    check_guard,
+    evaluator_of,
+    maker_of,
+)
 from tetra_drake.evolution.manifest import Method, RunRecord, read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
-from tetra_drake.files import check_folder, given_path
-from tetra_drake.formatting import Say, silent
+from tetra_drake.files import given_path
 from tetra_drake.machine import available_cores
+from tetra_drake.on_demand import loaded
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.robot.remarks import gain_remark, sinking_remark, start_up_remark
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
+from tetra_drake.scenario.load import given_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
 from tetra_drake.scenario.scenario import Scenario
-
-if TYPE_CHECKING:
-    from tetra_drake.study.fit import Fit
-    from tetra_drake.study.fit_problem import Bounds
-    from tetra_drake.study.measurements import Measurement
 
 
 def evolve(
@@ -72,7 +71,7 @@ def evolve(
             objective that reads result.trajectory has the attribute `needs_trajectory = True`.
         executor: A concurrent.futures.Executor or a Dask client, which stay open; or a function
             that makes an Executor for a number of workers, such as mpi4py's MPIPoolExecutor; see
-            also evolution.cluster.dask_cluster(). By default the compiled engine simulates the
+            also lab.cluster.dask_cluster(). By default the compiled engine simulates the
             candidates of all trials together, like simulate_many(). The other engines simulate in
             worker processes. If worker processes cannot import the objective, for example in a
             notebook, gaits are simulated one by one.
@@ -153,66 +152,6 @@ def evolve(
     return load_run(out)
 
 
-def fit(
-    scenario: GivenScenario,
-    measurements: Sequence[Measurement],
-    parameters: Mapping[str, Bounds],
-    *,
-    search: bool = False,
-    out: str | Path | None = None,
-    say: Say = silent,
-    source: object = "fit",
-) -> Fit:
-    """Fits values of a scenario to measurements of a robot, by bounded least squares.
-
-        >>> scenario = td.load_scenario("prism")
-        >>> heights = td.Rest(positions={"n3 z": "0.172 m", "n4 z": "0.172 m"})
-        >>> bounds = {"robot.cables.side.stiffness": ("50 N/m", "200 N/m")}
-        >>> fit = td.fit(scenario, [heights], bounds)
-        >>> stiffer = fit.scenario
-
-    Residuals are weighted by the uncertainties of the measurements. Their derivatives by the
-    parameters are finite differences of scenarios that are simulated side by side. The 95 %
-    intervals of the values follow from the derivatives.
-
-    Args:
-        scenario: a scenario, its name or file, or a run. Its values are the start.
-        measurements: values of the kinds td.MotionCapture and td.Rest.
-        parameters: the bounds, least and most, by scenario key. Texts have units; numbers are SI.
-            Keys joined by commas get the same value.
-        search: before least squares, searches all values within the bounds for a better start, by
-            CMA-ES; for data that several minima may fit.
-        out: a folder for the fitted scenario, tables, figure and page. It also keeps each
-            evaluation, so that an interrupted fit goes on where it was.
-        say: function that gets a line of text after each iteration.
-        source: file with the parameters, for errors.
-
-    Raises:
-        InputError: names what cannot be used.
-    """
-    from tetra_drake.study.fit import fit_values, save_fit
-    from tetra_drake.study.fit_problem import KEPT_EVALUATIONS
-
-    check_type("fit", "say", say, Callable)
-    folder = None if out is None else given_path(out, "fit", "out")
-    if folder is not None:
-        check_folder(folder)
-        if (folder / SCENARIO).exists() and not (folder / KEPT_EVALUATIONS).exists():
-            raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
-    found = fit_values(
-        given_scenario(scenario),
-        measurements,
-        parameters,
-        search=search,
-        folder=folder,
-        say=say,
-        source=source,
-    )
-    if folder is not None:
-        save_fit(found, folder)
-    return found
-
-
 def _simulate_again(
     record: RunRecord,
     objective: Objective | None,
@@ -223,19 +162,18 @@ def _simulate_again(
     """Evaluates the best gaits of a run on the Drake diagram, unless it was the run's engine.
     Simulates the gaits of a quality-diversity map, if any, on disturbed robots, and the best gait
     from moved starts. Records all in the run's folder; an error becomes a warning."""
-    from tetra_drake.study.elites import judge_elites
-    from tetra_drake.study.spread import record_spread
-
     directory = record.directory
     if record.manifest.scenario.engine_name != "drake":
         with _completing(progress, "the best gaits were not evaluated on the Drake diagram"):
             reevaluation.reevaluate(
                 directory, objective, workers=workers, executor=executor, progress=progress
             )
-    with _completing(progress, "gaits of the map were not simulated on disturbed robots"):
-        judge_elites(directory, workers=None if executor else workers)
+    threads = None if executor else workers
+    if module := record.manifest.scenario.optimizer.map:
+        with _completing(progress, "gaits of the map were not simulated on disturbed robots"):
+            loaded(f"{module}:judge_elites")(directory, workers=threads)
     with _completing(progress, "the spread of the best gait was not simulated"):
-        record_spread(directory, workers=None if executor else workers)
+        loaded("tetra_drake.lab.spread:record_spread")(directory, workers=threads)
 
 
 @contextlib.contextmanager

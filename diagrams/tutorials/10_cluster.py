@@ -4,8 +4,8 @@
 from pathlib import Path
 
 import tetra_drake as td
-from tetra_drake.evolution.cluster import dask_cluster, local_cluster
 from tetra_drake.figures.fitness import fitness_of_trials
+from tetra_drake.lab.cluster import dask_cluster, local_cluster
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import tetra_drake as td
-from tetra_drake.prototype.command_file import table_text
+from tetra_drake.robot.command_file import table_text
 from tetra_drake.scenario.scenario import Scenario
 
 settings = {"actuation": "!TensionMotor {max_force: 20 N, max_speed: 1 m/s, time_constant: 20 ms}"}

@@ -15,6 +15,7 @@ import pytest
 from helpers.actuations import LIMITED, MOTOR, WINCH
 from helpers.anchored import HUNG, floating_prism, scenario_of, supported_prism
 from helpers.converged import shortly
+from helpers.gaits import with_values
 from helpers.joined import with_arm
 from helpers.laws import COULOMB, FRICTIONS, RESET, UNEVEN
 
@@ -24,7 +25,8 @@ from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import WALKING_SEED, Gains, Gait, seeded_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import WALKING_SEED, seeded_gait
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS
@@ -62,8 +64,8 @@ NO_BRISTLES = {"friction.stiffness": "0 N/m"}
 
 
 def gait(seed: int = WALKING_SEED, **changes: Any) -> Callable[[Scenario], Changes]:
-    """A seeded gait that drives the robot, with some fields changed."""
-    return lambda scenario: {"gait": dataclasses.replace(seeded_gait(scenario, seed), **changes)}
+    """A seeded gait that drives the robot, with some parameters changed."""
+    return lambda scenario: {"gait": with_values(seeded_gait(scenario, seed), **changes)}
 
 
 def steered(scenario: Scenario) -> Changes:
@@ -127,7 +129,7 @@ def rows() -> Iterable[Any]:
         yield row(f"{terrain}, {law}", *cells)
     # The reset integrator's modes change 1e5 times while a robot with feedback lands.
     changes = {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS), "friction": COULOMB}
-    drive = gait(gains=Gains(**dict.fromkeys(PATHWAYS, 1.0)))
+    drive = gait(**{f"gain {pathway}": 1.0 for pathway in PATHWAYS})
     within = {"p_WN": 1e-6, "signal": 2e-5}
     yield row("feedback", "thesis", 0.1, changes, CONVERGE, within, drive)
     for signals in ("listing", "live"):

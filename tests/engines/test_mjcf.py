@@ -10,7 +10,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.engines.mjcf import make_mjcf
-from tetra_drake.robot.sdf import make_sdf
+from tetra_drake.lab.bridges.sdf import make_sdf
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.study.equilibrium import EquilibriumStudy, robot_of_file, study_equilibrium
 from tetra_drake.systems import AddCables

@@ -2,18 +2,22 @@
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
 import xarray
 from helpers.actuations import SIDES
 from helpers.converged import CONVERGED, shortly
+from helpers.gaits import with_values
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
-from tetra_drake.robot.network import Weights
+from tetra_drake.laws.matsuoka import Weights
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -35,9 +39,13 @@ def mirrored(trajectory: xarray.Dataset) -> np.ndarray:
 
 def image(gait: Gait, scenario: Scenario) -> Gait:
     """The gait whose oscillators have changed sides."""
-    images = Weights.of(scenario).images
-    weights = tuple(np.array(gait.weights)[images].tolist())
-    return dataclasses.replace(gait, weights=weights, turn=-gait.turn)
+    weights = Weights(scenario.blueprint(), scenario.cpg.reach)
+    names = [f"weight {name}" for name in weights.names]
+    exchanged = {
+        name: gait.parameters[names[image]]
+        for name, image in zip(names, weights.images.tolist(), strict=True)
+    }
+    return with_values(gait, turn=-gait.turn, **exchanged)
 
 
 @BOTH
@@ -46,11 +54,15 @@ def test_two_alike_oscillators_per_junction_walk_as_the_thesis_s_one(scenario, e
     # and not by the other of its own: then both sum to what the thesis's oscillator gets.
     thesis = shortly(scenario, 0.5, robot__tetrahedra=2, cpg__signals="listing")
     pairs = thesis.with_changes(SIDES)
-    gait, sides = seeded_gait(thesis), Weights.of(pairs)
-    weight = dict(zip(map(tuple, Weights.of(thesis).couplings), gait.weights, strict=True))
-    neurons = 2 * (sides.couplings // 4) + sides.couplings % 2  # of the thesis's network
-    halves = [0.5 * weight.get((i, j), 0.0) for i, j in neurons.tolist()]
-    split = dataclasses.replace(gait, weights=tuple(halves))
+    gait = seeded_gait(thesis)
+    halves = {}
+    for name in pairs.parameters:
+        if name.startswith("weight"):
+            source, onto = (1 + (int(k) - 1) // 2 for k in re.findall(r"\d+", name))
+            of_link = f"weight {source}->{onto} {name.rpartition(' ')[2]}"
+            halves[name] = 0.5 * gait.parameters.get(of_link, 0.0)
+    taus = {name: gait.parameters[name] for name in ("tau_A", "tau_B")}
+    split = dataclasses.replace(gait, parameters=halves | taus)
     one, two = walk(thesis, gait, engine), walk(pairs, split, engine)
     np.testing.assert_allclose(two.signal.values, np.repeat(one.signal.values, 2, 1), atol=1e-12)
     np.testing.assert_allclose(two.p_WN.values, one.p_WN.values, atol=1e-9)
@@ -86,11 +98,9 @@ def test_zero_gains_give_the_walk_without_feedback(scenario, engine):
 def test_each_feedback_changes_the_signals(scenario):
     live = {"cpg__signals": "live", "cpg__feedback": list(PATHWAYS), "friction": Coulomb()}
     short = shortly(scenario, 0.3, **live)
-    gaits = [Gains(), *(Gains(**{pathway: 1.0}) for pathway in PATHWAYS)]
-    none, *felt = (
-        walk(short, dataclasses.replace(seeded_gait(short), gains=gains), "!Compiled").signal
-        for gains in gaits
-    )
+    blind = with_values(seeded_gait(short), **{f"gain {pathway}": 0.0 for pathway in PATHWAYS})
+    gaits = [blind, *(with_values(blind, **{f"gain {pathway}": 1.0}) for pathway in PATHWAYS)]
+    none, *felt = (walk(short, gait, "!Compiled").signal for gait in gaits)
     for signal in felt:
         assert np.abs(none - signal).max() > 1e-3, "more than engines may differ by"
 

@@ -12,11 +12,13 @@ from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.robot.command import Command, controlled_robot
-from tetra_drake.robot.gait import ParameterSpace, PolicyParameters, load_gait, save_gait
-from tetra_drake.robot.network import usual_amplitude
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait, save_gait
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.policies import driven_names, imported_function
+from tetra_drake.scenario.policies import driven_names
+from tetra_drake.scenario.policy_kinds import imported_function
 
 DRAKE = "!Drake {scheme: runge_kutta3, accuracy: 1e-4, max_step: 2 ms}"
 WITNESS = "!Drake {scheme: runge_kutta3, accuracy: 1e-5, max_step: 1 ms, mode_changes: witness}"
@@ -46,7 +48,9 @@ def test_the_rolling_policy_moves_the_rover_as_a_controller_of_its_formula_does(
         return rest * (1.0 - np.clip((terms * COEFFICIENTS).sum(axis=-1), -0.5, 0.5))
 
     expected = simulate(plain, controller=roll)
-    rolled = simulate(scenario, PolicyParameters("rolling", COEFFICIENTS))
+    rolled = simulate(
+        scenario, Gait("rolling", dict(zip(scenario.parameters, COEFFICIENTS, strict=True)))
+    )
     assert rolled.metrics.to_json() == expected.metrics.to_json()
     assert abs(rolled.metrics.distance) > 0.001
 
@@ -63,12 +67,12 @@ def test_a_linear_policy_without_weights_is_a_command_of_its_biases(name, engine
     scenario = scenario.with_changes({"events": events, "simulation.duration": "0.16 s"})
     robot = controlled_robot(scenario)
     biases = np.linspace(-0.3, 0.6, robot.driven.size)
-    values = {key: 0.0 for key in scenario.policy_parameters}
+    values = {key: 0.0 for key in scenario.parameters}
     values |= dict(zip([key for key in values if key.startswith("bias")], biases, strict=True))
-    driven = simulate(scenario, PolicyParameters("biases", tuple(values.values())), record=True)
+    driven = simulate(scenario, Gait("biases", values), record=True)
 
     cables = Robot.of(scenario).starting_cables()
-    signals = usual_amplitude(scenario.cpg) * biases
+    signals = scenario.cpg.usual_amplitude * biases
     setpoints = scenario.actuation.commands(cables._replace(signal=signals))
     command = Command("biases", 1.0, setpoints[np.newaxis])
     played = simulate(scenario, command=command, record=True)
@@ -165,7 +169,7 @@ def own(readings, parameters, robots):
 def test_a_policy_of_ones_own_is_found_by_its_import_path():
     scenario = brief(policy=f"!Python {{function: '{__name__}:own', count: 1}}")
     result = simulate(scenario, td.seeded_gait(scenario))
-    assert result.metrics.to_json() != simulate(scenario, PolicyParameters("", (0.0,))).metrics
+    assert result.metrics.to_json() != simulate(scenario, Gait("", {"parameter 1": 0.0})).metrics
 
 
 @pytest.mark.parametrize(
@@ -196,14 +200,14 @@ def test_what_does_not_go_with_a_policy_is_refused(tmp_path):
     for key, value in {"cpg.feedback": ["load"], "simulation.control_period": "0.7 ms"}.items():
         with pytest.raises(InputError, match=key):
             scenario.with_changes({key: value, "cpg.signals": "live"})
-    with pytest.raises(InputError, match="found a gait, expected parameters of a policy"):
+    with pytest.raises(InputError, match="unknown names, such as 'weight"):
         simulate(scenario, gait)
-    with pytest.raises(InputError, match="scenario thesis has 0"):
+    with pytest.raises(InputError, match="lacks 25 names"):
         simulate(thesis, values)
     with pytest.raises(InputError, match="steering"):
         simulate(scenario, values, steering=0.5)
     save_gait(gait, tmp_path / "gait.json", thesis)
-    with pytest.raises(InputError, match="is a gait, expected parameters"):
+    with pytest.raises(InputError, match="unknown names, such as 'weight"):
         load_gait(tmp_path / "gait.json", scenario)
-    assert ParameterSpace.of(scenario).vector(values).tolist() == list(values.values)
+    assert ParameterSpace.of(scenario).vector(values).tolist() == list(values.parameters.values())
     assert imported_function(f"{__name__}:own") is own

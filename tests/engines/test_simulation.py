@@ -19,7 +19,7 @@ from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import Diverged, InputError
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.readings import Readings
-from tetra_drake.scenario.common_sections import Disturbances
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.scenario import Scenario
 
 PERIOD, PERIODS, LANES = 0.02, 15, processor_lanes()

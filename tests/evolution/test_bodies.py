@@ -18,7 +18,8 @@ from tetra_drake.evolution.trials import BEST_SCENARIO
 from tetra_drake.experiment import evolve
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.robot.gait import ParameterSpace, load_gait, seeded_gait, with_body
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import ParameterSpace, seeded_gait, with_body
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState
@@ -42,7 +43,7 @@ def run(prism, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tetra_drake.report.run_page.draw_pictures", quick_figures.draw_none)
         patch.setattr("tetra_drake.evolution.reevaluation.BEST_GAITS", 2)
-        patch.setattr("tetra_drake.study.spread.record_spread", lambda *_, **__: None)
+        patch.setattr("tetra_drake.lab.spread.record_spread", lambda *_, **__: None)
         out = tmp_path_factory.mktemp("run") / "it"
         return evolve(prism, out, executor=ThreadPoolExecutor, workers=1)
 

@@ -27,7 +27,7 @@ def test_the_five_best_of_each_trial_are_evaluated_again_once(run_small, monkeyp
     chosen = reevaluate(directory, progress=shown).reevaluations.set_index(["trial", "index"])
     assert sorted(chosen.index) == sorted(best.index)
     assert set(chosen["engine"]) == {"drake"} and shown.stage.called
-    assert (chosen["weight_7"] == best.loc[chosen.index, "weight_7"]).all()
+    assert (chosen["tau_A"] == best.loc[chosen.index, "tau_A"]).all()
     shorter = best.loc[chosen.index, "distance_in"] - 0.5 / 0.0254
     assert chosen["distance_in"].tolist() == pytest.approx(shorter.tolist())
     # What is recorded whole is not evaluated again.

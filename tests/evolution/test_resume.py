@@ -6,7 +6,7 @@ import pytest
 from helpers.analytic import Bowl, read_record, record_run, small_scenario
 
 from tetra_drake.evolution.entries import BEST_SCENARIO
-from tetra_drake.optimizers import quality_diversity
+from tetra_drake.lab.elites import quality_diversity
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState
 
 LEARNING = [CmaEs(sample=0), CmaEs(sample=8, starts=1, population=4)]

@@ -13,7 +13,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.optimizers.base import Task
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.settings.units import INCH
 
 
@@ -26,7 +26,7 @@ def test_every_evaluation_is_a_row_of_a_table_and_iterations_follow_from_them(ru
     assert table["placed"].iloc[:12].tolist() == list(range(12))
     for row in table.to_dict("records"):
         expected = Bowl()(Task(run.vector(1, row["index"])))
-        assert row["weight_3"] == run.vector(1, row["index"])[2]
+        assert row["weight 4->1 extensor"] == run.vector(1, row["index"])[2]
         if expected.failure:
             assert row["failure"] == expected.failure and math.isnan(row["fitness"])
         else:

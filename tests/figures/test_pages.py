@@ -26,8 +26,8 @@ from tetra_drake.figures.motion import (
     time_lapse,
 )
 from tetra_drake.figures.style import common_style
-from tetra_drake.study.comparison import compare, comparison
-from tetra_drake.study.elites import map_of_gaits
+from tetra_drake.lab.comparison import compare, comparison
+from tetra_drake.lab.elites.elites import map_of_gaits
 from tetra_drake.study.robustness import robustness_figure
 
 OF_A_GAIT = (

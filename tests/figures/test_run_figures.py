@@ -10,7 +10,7 @@ from matplotlib.container import BarContainer
 
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.fitness import fitness_of_trials, initial_distances, initial_fitness
-from tetra_drake.study.elites import map_of_gaits
+from tetra_drake.lab.elites.elites import map_of_gaits
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import numpy as np
 import pandas
 
 from helpers.synthetic_run import tiny_scenario
-from tetra_drake.scenario.common_sections import Disturbances
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.study.robustness import START, Judgement
 
 

@@ -10,9 +10,10 @@ import pytest
 from helpers.analytic import measures, optimise, small_scenario
 from threadpoolctl import threadpool_limits
 
-from tetra_drake.optimizers import cma_es, optimizer_of, quality_diversity
+from tetra_drake.lab.elites import quality_diversity
+from tetra_drake.optimizers import cma_es, optimizer_of
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.robot.gait import TAU_A, TAU_B, ParameterSpace
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState
 
 LEARNING = [CmaEs(sample=0), CmaEs(sample=20)]
@@ -20,6 +21,10 @@ DIVERSE = QualityDiversity()
 FLOOR = -50.0
 BUDGETED = [*LEARNING, DIVERSE, RandomSearch()]
 ALL = [*BUDGETED, SteadyState()]
+
+
+TAU_A, TAU_B = -2, -1
+"""Places of the time constants in a vector."""
 
 
 @pytest.fixture(autouse=True)

@@ -20,7 +20,7 @@ from tetra_drake.report.result_folder import (
     write_replay,
 )
 from tetra_drake.results.result import headline
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
 
@@ -78,7 +78,7 @@ def test_an_unfitting_trajectory_is_refused(folder, result, key, change, refused
 DAMAGES = {
     "duration_s": lambda content: content.update(duration_s=0.0),
     "metrics.speed": lambda content: content["metrics"].pop("speed"),
-    "gait.weights": lambda content: content["gait"]["weights"].pop("2->1 flexor"),
+    "gait.parameters": lambda content: content["gait"]["parameters"].pop("tau_A"),
     "integrator.steps": lambda content: content["integrator"].pop("steps"),
     "path.x_m": lambda content: content["path"]["x_m"].pop(),
 }

@@ -24,7 +24,7 @@ from tetra_drake.report.run_page import (
 )
 from tetra_drake.report.summary import run_text
 from tetra_drake.results.result import headline
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
@@ -145,7 +145,9 @@ def test_each_trial_and_each_setting_that_differs_from_the_thesis_has_a_row(page
 
 def test_the_best_gait_is_shown_with_its_weights_and_as_recorded(study, source, page):
     gait = study.best.result.gait
-    for name, weight in zip(gait.weight_names, gait.weights, strict=True):
+    weights = [pair for pair in gait.parameters.items() if pair[0].startswith("weight ")]
+    assert len(weights) == 4
+    for name, weight in weights:
         title = "oscillator {} inhibits {}: ".format(*re.findall(r"\d", name)) + rounded(weight)
         assert re.search(rf'title="{title}"[^>]*>\s*{weight:.2f}\s*<', source), title
     # As recorded; simulated again, this gait moves elsewhere, which a note says.

@@ -7,7 +7,7 @@ import pytest
 from helpers.laws import EXAMPLES
 
 from tetra_drake.errors import InputError
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 
@@ -55,7 +55,7 @@ def test_a_scenario_that_loads_makes_a_robot_or_one_line(name, draws, tmp_path):
             scenario = load_scenario(tmp_path / "any.yaml")
             ends.append("loads")
             robot = Robot.of(scenario)
-            robot.network(seeded_gait(scenario))
+            robot.oscillators(seeded_gait(scenario))
         except InputError as error:
             assert len(str(error).splitlines()) == 1
         else:

@@ -7,8 +7,8 @@ import pytest
 from helpers.actuations import MOTOR, WINCH
 
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.prototype.command_file import command_columns
 from tetra_drake.robot.command import Command, driven_robot
+from tetra_drake.robot.command_file import command_columns
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 

@@ -4,21 +4,15 @@ import dataclasses
 import itertools
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tetra_drake.robot.gait import (
-    TAU_A,
-    TAU_B,
-    Gains,
-    Gait,
-    ParameterSpace,
-    load_gait,
-    save_gait,
-    seeded_gait,
-)
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait, save_gait
+from tetra_drake.robot.parameter_space import ParameterSpace, seeded_gait
 from tetra_drake.scenario.load import load_scenario
 
 NAMES = [
@@ -29,7 +23,9 @@ NAMES = [
     if source != onto
 ]
 """B.2: w1, w2, w3 act on neuron 1 from 3, 5, 7; w4 on neuron 2 from 4; w24 on 8 from 6."""
-WEIGHTS = {name: 1.0 + 0.1 * i for i, name in enumerate(NAMES)}
+WEIGHTS = {f"weight {name}": 1.0 + 0.1 * i for i, name in enumerate(NAMES)}
+TAU_A, TAU_B = -2, -1
+"""Places of the time constants in a vector."""
 
 
 def write(folder: Path, content: object) -> Path:
@@ -39,18 +35,29 @@ def write(folder: Path, content: object) -> Path:
     return file
 
 
-def gait_file(**changes: object) -> dict[str, object]:
-    return {"schema": 2, "name": "mine", "weights": WEIGHTS, "tau_a_s": 0.3} | changes
+def gait_file(changes: Mapping[str, object] = {}, **keys: object) -> dict[str, object]:
+    parameters = WEIGHTS | {"tau_A": 0.3} | changes
+    return {"schema": 3, "name": "mine", "parameters": parameters} | keys
 
 
-def test_a_gait_file_gives_weights_and_time_constants(tmp_path, scenario):
+def test_a_gait_file_gives_parameters_by_name(tmp_path, scenario):
     shuffled = dict(reversed(WEIGHTS.items()))
-    gait = load_gait(write(tmp_path, gait_file(weights=shuffled)), scenario)
-    assert gait == Gait(name="mine", weights=tuple(WEIGHTS.values()), tau_a=0.3, tau_b=0.6)
-    assert gait.weight_names == tuple(NAMES)
-    # Of a first schema: a list in the order of the listing.
-    file = write(tmp_path, gait_file(schema=1, weights=list(WEIGHTS.values()), tau_b_s=0.45))
-    assert load_gait(file, scenario) == dataclasses.replace(gait, tau_b=0.45)
+    gait = load_gait(write(tmp_path, gait_file(parameters=shuffled | {"tau_A": 0.3})), scenario)
+    assert gait == Gait("mine", WEIGHTS | {"tau_A": 0.3, "tau_B": 0.6})
+    assert [*gait.parameters] == [*ParameterSpace.of(scenario).names]
+    free = load_gait(write(tmp_path, gait_file({"tau_B": 0.45})), scenario)
+    assert free == Gait("mine", WEIGHTS | {"tau_A": 0.3, "tau_B": 0.45})
+
+
+def test_a_file_of_version_0_5_0_is_the_same_gait(tmp_path):
+    scenario = load_scenario("feedback")
+    old = {"schema": 2, "name": "old", "tau_a_s": 0.3, "gains": {"pitch": -0.2}}
+    old["weights"] = {name.removeprefix("weight "): weight for name, weight in WEIGHTS.items()}
+    gait = load_gait(write(tmp_path, old), scenario)
+    gains = {"gain length": 0.0, "gain load": 0.0, "gain pitch": -0.2}
+    assert gait.parameters == WEIGHTS | gains | {"tau_A": 0.3, "tau_B": 0.6}
+    gait = load_gait(write(tmp_path, old | {"tau_b_s": 0.45}), scenario)
+    assert gait.parameters["tau_B"] == 0.45
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 4])
@@ -58,24 +65,27 @@ def test_a_gait_has_the_weights_of_its_robot(tmp_path, scenario, tetrahedra, ref
     scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra})
     # Two neurons per oscillator, each inhibited by its like in every other oscillator.
     gait = seeded_gait(scenario)
-    assert len(gait.weights) == 2 * (tetrahedra - 1) * (tetrahedra - 2)
+    assert len(gait.parameters) == 2 * (tetrahedra - 1) * (tetrahedra - 2) + 2
     save_gait(gait, tmp_path / "mine.json", scenario)
-    with refused(tmp_path / "mine.json", "weights", "lacks"):
+    with refused(tmp_path / "mine.json", "parameters", "lacks"):
         load_gait(tmp_path / "mine.json", scenario.with_changes({"robot.tetrahedra": 5}))
 
 
 BAD: list[tuple[object, str, str]] = [
-    (gait_file(weights=WEIGHTS | {"1->2 flexor": math.nan}), "weights.1->2 flexor", "nan"),
-    (gait_file(weights=WEIGHTS | {"5->1 flexor": 1.0}), "weights", "'5->1 flexor'"),
-    (gait_file(weights=[1.0] * 23), "weights", "23"),
-    (gait_file(weights=[1.0] * 23 + [-0.1]), "weights[23]", "-0.1"),
-    (gait_file(tau_a_s=0), "tau_a_s", "0"),
-    (gait_file(schema=3), "schema", "3"),
-    (gait_file(gains={"lenght": 0.1}), "gains.lenght", "'length'"),
-    (gait_file(gains={"load": 0.5}), "gains.load", "0.5"),  # the thesis has no feedback
+    (gait_file({"weight 1->2 flexor": math.nan}), "parameters.weight 1->2 flexor", "nan"),
+    (gait_file({"weight 5->1 flexor": 1.0}), "parameters", "'weight 5->1 flexor'"),
+    (gait_file(parameters=[1.0] * 26), "parameters", "list"),
+    (gait_file({"weight 1->2 flexor": -0.1}), "parameters.weight 1->2 flexor", "-0.1"),
+    (gait_file({"tau_A": 0}), "parameters.tau_A", "0"),
+    (gait_file(schema=4), "schema", "4"),
+    (gait_file({"gain lenght": 0.1}), "parameters", "'gain lenght'"),
+    (gait_file({"gain load": 0.5}), "parameters", "'gain load'"),  # the thesis has no feedback
     (gait_file(turn=0.5), "turn", "0.5"),  # its cables are driven in pairs, left and right
-    ('{"schema": 2, "schema": 2, "weights": {}, "tau_a_s": 0.3}', "", "twice"),
-    ('{"tau_a_s": 1' + "0" * 5000 + "}", "", "JSON"),  # beyond Python's limit of digits
+    (gait_file(parameters={"x": 1.0, "z": 2.0}), "parameters", "25 names"),  # of a policy
+    ({"schema": 1, "weights": [1.0] * 24, "tau_a_s": 0.3}, "parameters.weight ", "a list"),
+    ({"schema": 2, "weights": {}, "gains": [], "tau_a_s": 0.3}, "parameters.gain ", "a list"),
+    ('{"schema": 3, "schema": 3, "parameters": {}}', "", "twice"),
+    ('{"tau_A": 1' + "0" * 5000 + "}", "", "JSON"),  # beyond Python's limit of digits
     ("[" * 100_000, "", "JSON"),
 ]
 
@@ -99,7 +109,7 @@ def shipped(request):
 def test_a_saved_gait_of_any_scenario_loads_back(tmp_path, shipped):
     gait = seeded_gait(shipped, 5)
     for name in shipped.cpg.feedback:
-        assert getattr(gait.gains, name) != 0.0
+        assert gait.parameters[f"gain {name}"] != 0.0
     assert gait.turn == (1.0 if shipped.name == "turning" else 0.0)
     # A gait's own turn counts, whatever those are that the scenario evolves.
     gait = dataclasses.replace(gait, turn=0.25 * gait.turn)
@@ -130,11 +140,11 @@ def test_mirrored_weights_are_one_parameter_for_left_and_right():
     assert (len(space.names), len(free.names)) == (32 + 2, 64 + 2)
     assert space.names[0] == free.names[0] == "weight 2->1 extensor", "named by the first"
     vector = np.arange(34.0) + 1.0
-    weights = space.gait(vector, name="any").weights
-    by_name = dict(zip(free.names, weights, strict=False))
+    by_name = space.gait(vector, name="any").parameters
     # Oscillators 1, 3, 5, 7 are on the left, 2, 4, 6, 8 on the right of the same junctions.
     for name, image in (("2->1 extensor", "1->2 extensor"), ("5->4 flexor", "6->3 flexor")):
         assert by_name[f"weight {name}"] == by_name[f"weight {image}"]
+    weights = [value for name, value in by_name.items() if name.startswith("weight")]
     assert sorted(weights) == sorted([*vector[:32], *vector[:32]])
 
 
@@ -149,8 +159,8 @@ def test_parameters_have_the_bounds_and_floors_of_the_thesis_and_gains_no_floor(
     assert rows["tau_B"] == (0.4, 1.0, 0.4)
     assert rows["gain load"] == (-1.0, 1.0, -math.inf)
     gait = space.gait(np.arange(29.0), name="any")
-    assert gait.gains == Gains(length=24.0, load=25.0, pitch=26.0)
-    assert (gait.tau_a, gait.tau_b) == (27.0, 28.0)
+    gains = {"gain length": 24.0, "gain load": 25.0, "gain pitch": 26.0}
+    assert gait.parameters.items() >= (gains | {"tau_A": 27.0, "tau_B": 28.0}).items()
 
 
 def test_repair_couples_tau_b_unless_it_is_independent(scenario):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tetra_drake.errors import InputError
-from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.network import Weights
+from tetra_drake.laws.matsuoka import Weights
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
 
@@ -31,16 +31,16 @@ def test_two_oscillators_silence_each_other_with_weights_above_two(scenario, low
 
 def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
     near = scenario.with_changes(SIDES | {"cpg.reach": 1})
-    weights = Weights.of(near)
+    weights = Weights(near.blueprint(), near.cpg.reach)
     # Each junction's pair within (2 weights per kind of neuron), and to each neighbouring pair.
     assert len(weights.couplings) == 2 * (4 * 2 + 3 * 2 * 4)
     junction = Robot.of(near).senses.ahead[weights.couplings // 2]
     assert (np.abs(np.diff(junction, axis=1)) <= 1).all()
     gait = seeded_gait(near)
-    matrix = Robot.of(near).network(gait).inhibition
-    assert np.count_nonzero(matrix) == len(weights.couplings) + 16  # and the partners
+    network = Robot.of(near).oscillators(gait).constants
+    assert len(network.weight) == len(weights.couplings) + 16  # and the partners
     alone = scenario.with_changes({"cpg.reach": 0})
-    assert seeded_gait(alone).weights == ()
+    assert [*seeded_gait(alone).parameters] == ["tau_A", "tau_B"]
 
 
 def test_a_turn_strengthens_the_left_by_what_it_weakens_the_right(scenario):
@@ -85,6 +85,8 @@ def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
 
 
 def test_a_gait_that_does_not_fit_is_refused(scenario, robot, refused):
-    gait = dataclasses.replace(seeded_gait(scenario), weights=(1.0,) * 23)
-    with refused(f"gait {gait.name}", "weights", "expected"):
-        robot.network(gait)
+    gait = seeded_gait(scenario)
+    fewer = {name: x for name, x in gait.parameters.items() if name != "weight 2->1 extensor"}
+    gait = dataclasses.replace(gait, parameters=fewer)
+    with refused(f"gait {gait.name}", "parameters", "'weight 2->1 extensor'"):
+        robot.oscillators(gait)

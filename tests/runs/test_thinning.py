@@ -11,10 +11,10 @@ from tetra_drake.evolution.entries import EliteLine
 from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
-from tetra_drake.laws.terrain import HeightField
+from tetra_drake.lab.elites.elites import elites
+from tetra_drake.laws.height_field import HeightField
 from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.study.elites import elites
 
 AGAIN, ALONE, EDGE, BEYOND = range(20, 24)
 """Evaluations that nothing else makes matter: reevaluated; alone in its cell of the map, and one

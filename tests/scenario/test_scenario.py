@@ -298,7 +298,6 @@ PRIVATE = [
 
 
 NAMING_IT = ["base: any", "base: thesis\nrobot: !Structure {file: any}"]
-NAMING_IT += ["base: thesis\nrobot: !Structure {file: parts.yaml, unit: m}"]
 NAMING_IT += ["base: thesis\nterrain: !HeightField {file: any, cell: 1 m}"]
 
 
@@ -306,7 +305,6 @@ NAMING_IT += ["base: thesis\nterrain: !HeightField {file: any, cell: 1 m}"]
 @pytest.mark.parametrize("text", NAMING_IT)
 def test_nothing_is_shown_of_a_file_that_is_something_else(tmp_path, content, text):
     (tmp_path / "any").write_text(content)
-    write(tmp_path, "substructures: {part: {path: any}}", "parts.yaml")
     with pytest.raises(InputError) as caught:
         load_scenario(write(tmp_path, text))
     assert "secret" not in str(caught.value)

@@ -1,6 +1,5 @@
 """Scenarios whose robot is a structure from a file."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +12,6 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_structures
 from tetra_drake.scenario.structure_files import read_structure
 
-NTRT = """
-nodes: {a: [0, 0, 0], b: [1, 0, 0], c: [0, 0, 1], d: [1, 0, 1]}
-pair_groups: {rod: [[a, b], [c, d]], fast string: [[a, c], [b, d]]}
-"""
-
 
 def load(folder: Path, robot: str, *, more: str = "") -> Scenario:
     """The scenario mine.yaml, on the thesis's."""
@@ -28,9 +22,8 @@ def load(folder: Path, robot: str, *, more: str = "") -> Scenario:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with a structure file, own.yaml, and one of NTRT."""
+    """A folder with a structure file, own.yaml."""
     (tmp_path / "own.yaml").write_text(FILE)
-    (tmp_path / "ntrt.yaml").write_text(NTRT)
     return tmp_path
 
 
@@ -99,13 +92,6 @@ def test_numbers_of_groups_have_dotted_keys(folder: Path) -> None:
         assert free_length == approx(np.hypot(0.07, 0.10) - tension / 100.0)
 
 
-def test_a_file_of_ntrt_needs_a_unit(folder: Path) -> None:
-    robot = "!Structure {file: ntrt.yaml, unit: dm, actuated: {one: [fast/string b d]}}"
-    given = load(folder, robot).robot
-    assert given.nodes["d"] == approx([0.1, 0.1, 0.0])
-    assert given.blueprint().groups == ((1,),)
-
-
 def test_a_unit_is_that_of_bare_coordinates() -> None:
     in_m, in_dm = read_structure("prism"), read_structure("prism", unit="dm")
     for node, place in in_m.nodes.items():
@@ -114,7 +100,6 @@ def test_a_unit_is_that_of_bare_coordinates() -> None:
 
 FAULTS = [
     ("!Structure {file: none.yaml}", "robot.file", "none.yaml"),
-    ("!Structure {file: ntrt.yaml}", "robot.unit", "missing"),
     ("!Structure {file: own.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
     ("!Structure {file: own.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
 ]
@@ -150,10 +135,6 @@ def test_a_change_of_a_group_of_another_name_tells_a_similar_one(refused) -> Non
 def test_a_structure_that_is_not_there_is_one_line(tmp_path: Path, name, fact, refused) -> None:
     with refused(name, "", fact):
         read_structure(name)
-    parts = tmp_path / "parts.yaml"
-    parts.write_text(f"substructures: {{part: {{path: {json.dumps(name)}}}}}")
-    with refused(tmp_path / name, "", ""):
-        read_structure(parts, unit="m")
 
 
 OF_A_ROW = [("require", {"twist": "0 m"})]

@@ -12,9 +12,10 @@ from helpers.synthetic_run import tiny_scenario
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.robot.gait import save_gait, seeded_gait
-from tetra_drake.scenario.common_sections import Disturbances
+from tetra_drake.robot.gait_file import save_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws, fresh_seed
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.study import robustness
 from tetra_drake.study.robustness import robustness_text
@@ -178,5 +179,5 @@ def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement
 
 
 def test_a_gait_of_another_robot_is_refused(scenario, refused):
-    with refused("gait random gait 1", "weights", "expected 4"):
+    with refused("gait random gait 1", "parameters", "expected the 6"):
         robustness.robustness(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)

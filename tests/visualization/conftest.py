@@ -6,7 +6,7 @@ import os
 import pytest
 from pydrake.geometry import MeshcatParams
 
-from tetra_drake.visualization.browser import find_browser, launch_browser
+from tetra_drake.lab.films.browser import find_browser, launch_browser
 from tetra_drake.visualization.replay import quiet_meshcat
 
 PATIENCE = 90_000  # ms

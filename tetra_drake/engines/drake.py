@@ -36,7 +36,8 @@ from tetra_drake.errors import (
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.robot.command import signals_of_one
 from tetra_drake.robot.equilibrium import Unactuated, damping_at_rest, mass_matrix
-from tetra_drake.robot.gait import GivenGait, given_gait, with_body
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot, Pilot
@@ -131,8 +132,8 @@ class _DiagramRobot:
     def _build(self, robot: Robot) -> None:
         """Makes the diagram of a robot, and what follows its simulation."""
         driven, settings = self._driven, robot.scenario.settings_of(Drake)
-        if driven.gait is not None:
-            diagram = MakeTensegrityDiagram(robot, driven.gait, steering=driven.steering)
+        if (gait := driven.oscillating) is not None:
+            diagram = MakeTensegrityDiagram(robot, gait, steering=driven.steering)
         elif driven.pilot is not None:
             law = functools.partial(_signals, driven.pilot, driven.robot.first_signals)
             system = SampledController(robot, law, period=driven.pilot.period)

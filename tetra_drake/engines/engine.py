@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.on_demand import loaded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import driven_robot
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 
 if TYPE_CHECKING:
     import xarray
@@ -44,7 +45,7 @@ class Engine:
     has_threads: ClassVar[bool] = True
     """True if the engine is faster with several threads, each with its own robots."""
 
-    def check(self, scenario: Scenario) -> None:
+    def check(self, scenario: World) -> None:
         """Raises InputError if the engine cannot simulate the scenario."""
 
     def prepare(self, scenario: Scenario) -> None:
@@ -77,19 +78,19 @@ class Engine:
         raise NotImplementedError
 
 
-def engine_of(scenario: Scenario) -> Engine:
+def engine_of(scenario: World) -> Engine:
     """Engine that the scenario's setting `engine` names. Its module is imported on demand."""
-    engine: Engine = importlib.import_module(scenario.engine.module).ENGINE
+    engine: Engine = loaded(f"{scenario.engine.module}:ENGINE")
     return engine
 
 
-def check_engine(scenario: Scenario, name: str, reason: str) -> None:
+def check_engine(scenario: World, name: str, reason: str) -> None:
     """Raises InputError unless the scenario's engine has this name. The message gives a reason."""
     if scenario.engine_name != name:
         problem = f"found '{scenario.engine_name}', expected '{name}': {reason}"
         raise InputError(f"scenario {scenario.name}", "engine", problem)
 
 
-def check_can_be_watched(scenario: Scenario) -> None:
+def check_can_be_watched(scenario: World) -> None:
     """Raises InputError if the scenario's engine does not support a viewer."""
     check_engine(scenario, "drake", "no other engine can be watched")

@@ -29,7 +29,7 @@ from tetra_drake.robot.structure import (
 from tetra_drake.robot.xml_elements import add_element, xml_text
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.events import up_to_each
-from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 
 _IMPRATIO = 1000.0
 """MuJoCo's option impratio: the ratio of the impedances of friction and normal force. In MuJoCo the
@@ -52,7 +52,7 @@ _SOFT = {"condim": "3", "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1]}
 """Settings of all contacts."""
 
 
-def check_mjcf(scenario: Scenario) -> None:
+def check_mjcf(scenario: World) -> None:
     """Raises InputError, which names the scenario's key, if MuJoCo cannot simulate the scenario's
     terrain or its law of friction."""
     if scenario.terrain.plane_slope is None:

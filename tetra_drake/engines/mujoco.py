@@ -55,7 +55,7 @@ from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.robot.structure import with_origins
 from tetra_drake.scenario.engine_kinds import Mujoco
-from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 
 Array = np.ndarray
 
@@ -71,7 +71,7 @@ class MujocoEngine(Engine):
     that are nearest to their times.
     """
 
-    def check(self, scenario: Scenario) -> None:
+    def check(self, scenario: World) -> None:
         if not installed():
             raise InputError(scenario.name, "engine", f"mujoco is not installed: {INSTALL}")
         if scenario.cpg.feedback:

@@ -17,9 +17,10 @@ from tetra_drake.robot.command import (
     driven_robot,
     robot_of_controller,
 )
-from tetra_drake.robot.gait import GivenGait, given_gait, seeded_gait
-from tetra_drake.robot.network import SteeringSignal, constant_steering
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.steering import SteeringSignal, constant_steering
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -155,6 +156,6 @@ def check_scenario(scenario: Scenario) -> None:
         raise InputError(scenario.name, "robot.actuated", problem)
     robot, gait = Robot.of(scenario), seeded_gait(scenario)
     driven = driven_robot(scenario, gait, robot=robot)
-    if driven.gait is not None:
-        robot.network(driven.gait)
+    if driven.oscillating is not None:
+        robot.oscillators(driven.oscillating)
     engine_of(scenario).check(scenario)

@@ -160,7 +160,7 @@ class IterationLine(Line):
 
 class EliteLine(Line):
     """Line of a record for one elite, simulated on disturbed robots. An elite is the fittest gait
-    in a cell of the map that !QualityDiversity fills; see study.elites."""
+    in a cell of the map that !QualityDiversity fills; see lab.elites.elites."""
 
     identity = ("trial", "index")
 
@@ -172,7 +172,7 @@ class EliteLine(Line):
 
 class SpreadLine(Line):
     """Line of a record with the least and greatest values of a gait's metrics for moved starts; see
-    study.spread."""
+    lab.spread."""
 
     identity = ("trial", "index")
 

@@ -28,7 +28,8 @@ from tetra_drake.errors import (
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import AnyGait, ParameterSpace, with_body
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import ParameterSpace, with_body
 from tetra_drake.scenario.disturbances import draws_of_iteration
 from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
@@ -107,7 +108,7 @@ class GaitEvaluation:
     def __reduce__(self) -> tuple[object, ...]:
         return GaitEvaluation, (self.scenario, self.objective)  # without the caches
 
-    def _simulations(self, task: Task) -> list[tuple[Scenario, AnyGait]]:
+    def _simulations(self, task: Task) -> list[tuple[Scenario, Gait]]:
         """Scenario and gait of each simulation that a task needs: one simulation, or with
         disturbances one per draw (randomly changed scenario). A body that cannot be disturbed,
         because no robot can have it, needs one simulation, which refuses it."""

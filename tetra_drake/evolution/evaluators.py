@@ -23,14 +23,17 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Say
 from tetra_drake.machine import available_cores
+from tetra_drake.on_demand import loaded
 from tetra_drake.optimizers.base import Evaluate, Evaluation, Task
 
 if TYPE_CHECKING:
+    from distributed import Client
+
     from tetra_drake.evolution.evaluation import GaitEvaluation
 
 Submit = Callable[[Task], Future[Evaluation]]
@@ -43,6 +46,9 @@ done."""
 MakeExecutor = Callable[[int], Executor]
 """Function that makes an executor with the given number of workers. If it cannot choose the number,
 it has an attribute `workers`: the current number, or a text about it."""
+
+GivenExecutor = Union[Executor, MakeExecutor, "Client"]
+"""An executor, a function that makes one, or a Dask client."""
 
 TASKS_PER_WORKER = 150
 """Number of tasks after which a worker process is replaced. Drake before 1.56 leaks about 2 MB per
@@ -254,3 +260,19 @@ def _why_not_sent(evaluate: object) -> str:
     if file is not None and program.__spec__ is None and not os.path.exists(file):
         return f"have to import the program, and '{file}' is no file"
     return ""
+
+
+def maker_of(executor: GivenExecutor | None) -> MakeExecutor | None:
+    """Converts the argument `executor` of evolve() to a function that makes an executor; None stays
+    None. Raises InputError if the argument is neither an executor nor a Dask client nor a
+    function."""
+    if isinstance(executor, Executor):
+        return LentExecutor(executor)
+    dask = sys.modules.get("distributed")
+    if dask and isinstance(executor, dask.Client):
+        made: MakeExecutor = loaded("tetra_drake.lab.cluster:executor_of")(executor)
+        return made
+    if executor is None or callable(executor):
+        return executor
+    expected = "an Executor, a Dask client, or a function that makes an Executor"
+    raise InputError("evolve", "executor", f"found {executor!r:.60}, expected {expected}")

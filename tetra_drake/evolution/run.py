@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +29,9 @@ from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path
 from tetra_drake.formatting import Say, TextTable, heading_html, rounded, silent
 from tetra_drake.results.result import headline
-from tetra_drake.robot.gait import AnyGait, ParameterSpace, Vector, load_gait, with_body
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector, with_body
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS, MetricRanges
 from tetra_drake.scenario.scenario import Scenario
@@ -57,8 +60,8 @@ class Run:
       population
     - the metrics in SI (distance ...), distance_in (inches)
     - lifted_T1 ...: Metrics.lifted_shares, by the names of the bodies
-    - the parameters: weight_1 ... (order of the thesis's listing), gain_length ..., numbers of the
-      body in SI by their keys, tau_a_s, tau_b_s; NaN in a thinned run
+    - the parameters by the names of ParameterSpace.names, such as "tau_A", in SI; NaN in a thinned
+      run
     - with disturbances: draws_fitness and draws_distance (m), lists with one number per draw, and
       worst_distance (m). Lists are missing if the evaluation failed.
     """
@@ -153,7 +156,7 @@ class Run:
 
     def spread_of(self, gait: pandas.Series) -> MetricRanges:
         """Recorded ranges of the metrics of a gait, a row of `evaluations`, for moved starts; see
-        study.spread. Empty if there are none."""
+        lab.spread. Empty if there are none."""
         for line in self.file(SPREADS).read():
             if (line.trial, line.index) == (gait["trial"], gait["index"]):
                 return dict(line.spread)
@@ -166,7 +169,7 @@ class Run:
         first = rows[rows["iteration"] == rows["iteration"].min()]
         return first.loc[first["fitness"].idxmax()]
 
-    def best_gait(self) -> AnyGait:
+    def best_gait(self) -> Gait:
         """The fittest gait of all trials. Raises InputError if no gait has a fitness yet."""
         best = self.fittest()
         return self.gait(best["trial"], best["index"])
@@ -176,7 +179,7 @@ class Run:
         if no gait has a fitness yet."""
         return with_body(self.scenario, self.best_gait())[0]
 
-    def gaits(self, count: int = 1) -> list[AnyGait]:
+    def gaits(self, count: int = 1) -> list[Gait]:
         """The `count` fittest different gaits of each trial, in the order of best(). The name of
         each gait contains its trial and evaluation."""
         best = self.best(count)
@@ -200,7 +203,7 @@ class Run:
             raise InputError(self.directory, "", problem)
         return rows.loc[(trial, index), _parameters(self.scenario)].to_numpy(dtype=np.float64)
 
-    def gait(self, trial: int, index: int) -> AnyGait:
+    def gait(self, trial: int, index: int) -> Gait:
         """The gait of evaluation `index` of a trial."""
         return self.manifest.gait(self.vector(trial, index), trial=trial, index=index)
 
@@ -282,15 +285,11 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
 
 
 def _parameters(scenario: Scenario) -> list[str]:
-    """Names of the columns of Run.evaluations that hold the parameters of a gait, such as
-    "weight_1" and "tau_a_s". They are in the order of the parameter vector."""
-    space = ParameterSpace.of(scenario)
-    others, kind = [*space.free_body], "parameter"
-    if not space.of_policy:
-        gains = [f"gain_{name}" for name in space.pathways]
-        others, kind = [*gains, *others, "tau_a_s", "tau_b_s"], "weight"
-    count = len(space.names) - len(others)
-    return [f"{kind}_{number}" for number in range(1, count + 1)] + others
+    """Names of the columns of Run.evaluations that hold the parameters of a gait, such as "tau_A",
+    in the order of the parameter vector."""
+    taken = {*EvaluationLine.model_fields, *METRICS}
+    names = ParameterSpace.of(scenario).names
+    return [f"parameter {name}" if name in taken else name for name in names]
 
 
 def _check_iterations(
@@ -317,9 +316,9 @@ class GaitSource:
     """Gaits of a file or a run, and the scenario to simulate them on."""
 
     scenario: Scenario
-    best: AnyGait
+    best: Gait
     """The gait of the file, or the best gait of the run."""
-    gaits: dict[str, AnyGait]
+    gaits: dict[str, Gait]
     """The gait of the file by its name, or the best gait of each trial by "trial 0" ..."""
     spread: MetricRanges
     """Recorded ranges of the metrics of a run's best gait; see Run.spread_of()."""
@@ -354,3 +353,12 @@ def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent
         made = f"made for scenario {best.scenario}"
         warn(f"{source}: {made}, simulated on scenario {chosen.name}")
     return GaitSource(chosen, best, gaits, spread)
+
+
+def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:
+    """Gaits without repetitions: a list of pairs, the names of a gait and its row of
+    Run.evaluations. `named` has such a row by name; a gait may have several names."""
+    names: dict[Any, list[str]] = {}
+    for name, gait in named.items():
+        names.setdefault((gait["trial"], gait["index"]), []).append(name)
+    return [(alike, named[alike[0]]) for alike in names.values()]

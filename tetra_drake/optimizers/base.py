@@ -9,9 +9,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tetra_drake.robot.gait import ParameterSpace, Vector
-from tetra_drake.scenario.common_sections import EvolutionSection
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario.disturbances import IterationSeed
+from tetra_drake.scenario.experiment_sections import EvolutionSection
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.base import Evaluation, Iteration, mean_fitness
-from tetra_drake.robot.gait import TAU_B, ParameterSpace, Vector
-from tetra_drake.scenario.common_sections import EvolutionSection
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
+from tetra_drake.scenario.experiment_sections import EvolutionSection
 
 Matrix = npt.NDArray[np.float64]
 
@@ -52,9 +52,8 @@ class Ranges:
 
     def __init__(self, space: ParameterSpace) -> None:
         self._space = space
-        self.free = space.high > space.low
+        self.free = (space.high > space.low) & ~space.is_coupled
         """True for each parameter of a gait that is free."""
-        self.free[TAU_B] &= not space.couples_tau_b
         self.width = (space.high - space.low)[self.free]
         """Range of each free parameter in random gaits."""
         self.size = len(self.width)

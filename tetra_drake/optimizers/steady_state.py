@@ -12,17 +12,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tetra_drake.files import json_number
+from tetra_drake.laws.matsuoka import TAU_B_PER_TAU_A
 from tetra_drake.optimizers.base import Evaluation, Iteration, mean_fitness
-from tetra_drake.robot.gait import TAU_A, TAU_B, TAU_B_PER_TAU_A, ParameterSpace, Vector
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
-from tetra_drake.scenario.common_sections import EvolutionSection
+from tetra_drake.scenario.experiment_sections import EvolutionSection
 
 GAIN_MUTATION = 0.2
 """Largest change of a feedback gain in one mutation."""
 
 RANGE_MUTATION = 0.1
-"""Largest change of a number of the body, or of a policy, in one mutation, as a share of its
-range."""
+"""Largest change of any other parameter in one mutation, as a share of its range."""
 
 
 @dataclass(eq=False)
@@ -97,21 +97,22 @@ def select_parent(fitnesses: Vector, *, tournament: int, generator: np.random.Ge
 
 
 def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector:
-    """Largest change of each parameter in one mutation (Table 6 of the thesis); 0 if its bounds are
-    equal.
+    """Largest change of each parameter in one mutation: of weights, gains and time constants as in
+    Table 6 of the thesis, of others a tenth of the range; 0 if the bounds are equal.
 
     With `tau_mutation: listing`, tau_A does not mutate, like in the thesis's listing A.3.4, whose
-    index 26 means tau_B. For a policy it is a tenth of the range.
+    index 26 means tau_B.
     """
-    shares = RANGE_MUTATION * (space.high - space.low)
-    if space.of_policy:
-        return shares
-    is_gain = np.array([name.startswith("gain ") for name in space.names])
-    steps = np.where(is_gain, GAIN_MUTATION, settings.weight_mutation)
-    step = settings.tau_mutation_range
-    steps[TAU_A] = 0.0 if settings.tau_mutation == "listing" else step
-    steps[TAU_B] = TAU_B_PER_TAU_A * step
-    steps[space.body] = shares[space.body]
+    tau = settings.tau_mutation_range
+    of_word = {
+        "weight": settings.weight_mutation,
+        "gain": GAIN_MUTATION,
+        "tau_A": 0.0 if settings.tau_mutation == "listing" else tau,
+        "tau_B": TAU_B_PER_TAU_A * tau,
+    }
+    ranges = (RANGE_MUTATION * (space.high - space.low)).tolist()
+    given = zip(space.names, ranges, strict=True)
+    steps = np.array([of_word.get(name.partition(" ")[0], share) for name, share in given])
     return np.where(space.low == space.high, 0.0, steps)
 
 

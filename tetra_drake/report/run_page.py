@@ -22,7 +22,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, BEST_SCENARIO, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST, read_manifest
-from tetra_drake.evolution.run import Run, gait_label, load_run
+from tetra_drake.evolution.run import Run, distinct_gaits, gait_label, load_run
 from tetra_drake.figures.fitness import (
     fitness_of_trials,
     initial_distances,
@@ -42,21 +42,24 @@ from tetra_drake.figures.style import AS_USUAL, Print, save_figure
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import listed, render, rounded
 from tetra_drake.machine import versions
+from tetra_drake.on_demand import loaded
 from tetra_drake.report import summary
 from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
 from tetra_drake.results.result import SimulationResult, headline
-from tetra_drake.robot.gait import AnyGait, Gait, PolicyParameters, load_gait, save_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait, save_gait
 from tetra_drake.robot.remarks import stillness_remark
 from tetra_drake.scenario import metrics
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.study.elites import distinct_gaits, elites, map_of_gaits, notable_gaits
 
 REPORT, FIGURES = "report.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites/elites.csv"
 
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
-_MOST_PARAMETERS = 40  # of a policy; further ones are not shown
+_MOST_PARAMETERS = 40  # further ones are not shown
+_WEIGHT = "weight "
+"""Beginning of the names of weights between oscillators."""
 RECORDED_GAIT, RECORDED = Path(__file__).with_name("thesis_gait.json"), "recorded.html"
 """The best recorded gait of the thesis's robot, and the name of its replay page."""
 BLOCK_DIAGRAM = Path(__file__).parents[1] / "systems/robot.svg"
@@ -161,7 +164,8 @@ def write_report(directory: Path, printed: Print = AS_USUAL) -> list[Path]:
     draw_pictures(pictures, figures, printed)
     run, notable = shown.run, _notable(shown)
     if notable:
-        write_whole(directory / ELITES_CSV, elites(run).to_csv(index=False))
+        elites = _of_map(run, "elites")(run)
+        write_whole(directory / ELITES_CSV, elites.to_csv(index=False))
     for _, row, file, page in notable:
         save_gait(run.gait(row["trial"], row["index"]), directory / str(file), run.scenario)
         if page != REPLAY:
@@ -221,8 +225,8 @@ def pictures_of_run(shown: ShownGaits) -> Pictures:
         evolution.append(partial(initial_distances, run))
     if trial in trials:
         evolution.append(partial(initial_fitness, run, trial))
-    if len(elites(run)):
-        evolution.append(partial(map_of_gaits, run))
+    if run.scenario.optimizer.map and len(_of_map(run, "elites")(run)):
+        evolution.append(partial(_of_map(run, "map_of_gaits"), run))
     evolution.append(partial(before_and_after, initial, best))
     return {"evolution": evolution, **pictures_of_gait(best)}
 
@@ -240,12 +244,19 @@ def _notable(shown: ShownGaits) -> list[GaitColumn]:
     """Columns of the notable gaits of a run's quality-diversity map (see notable_gaits()); empty
     without a map. The page of the run's best gait is the run's replay.html, others are in
     elites/."""
+    if not shown.run.scenario.optimizer.map:
+        return []
     found, best = [], gait_label(shown.best.recorded)
-    for names, row in distinct_gaits(notable_gaits(shown.run)):
+    for names, row in distinct_gaits(_of_map(shown.run, "notable_gaits")(shown.run)):
         name = names[0].replace(", ", "_").replace(" ", "_")
         page = REPLAY if gait_label(row) == best else f"{ELITES}/{name}.html"
         found.append(GaitColumn(names, row, f"{ELITES}/{name}.json", page))
     return found
+
+
+def _of_map(run: Run, name: str) -> Any:
+    """Function of the module for the map that the run's optimiser fills."""
+    return loaded(f"{run.scenario.optimizer.map}:{name}")
 
 
 def _embedded(picture: partial[Any], folder: Path) -> dict[str, str]:
@@ -262,18 +273,14 @@ def _data_uri(drawing: Path) -> str:
     return f"data:image/svg+xml;base64,{base64.b64encode(drawing.read_bytes()).decode()}"
 
 
-def _parameters_text(gait: AnyGait, scenario: Scenario) -> str:
-    """Sentence with the parameters of a gait except its weights, or of a policy."""
-    if isinstance(gait, PolicyParameters):
-        pairs = zip(scenario.policy_parameters, gait.values, strict=True)
-        shown = [f"{name}: {rounded(value)}" for name, value in pairs][:_MOST_PARAMETERS]
-        if more := len(gait.values) - len(shown):
-            shown.append(f"{more} more")
-        return f"Parameters of the policy: {listed(shown)}"
-    gains = [f"feedback gain of {name} {rounded(gain)}" for name, gain in gait.gains if gain]
-    turn = [f"turn {rounded(gait.turn)}"] if gait.turn else []
-    times = [f"τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s"]
-    return f"Time constants {listed([*times, *turn, *gains])}"
+def _parameters_text(gait: Gait, scenario: Scenario) -> str:
+    """Sentence with the parameters of a gait except its weights, and with its turn."""
+    others = {name: x for name, x in gait.parameters.items() if not name.startswith(_WEIGHT)}
+    units = {name: one.unit for name, one in scenario.parameters.items()}
+    others |= {"turn": gait.turn} if gait.turn else {}
+    shown = [f"{name} {rounded(x)} {units.get(name, '')}".strip() for name, x in others.items()]
+    more = [f"{len(shown) - _MOST_PARAMETERS} more"] if len(shown) > _MOST_PARAMETERS else []
+    return listed([*shown[:_MOST_PARAMETERS], *more])
 
 
 def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str:
@@ -314,9 +321,11 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
         gaits=gaits,
         map=_notable(shown),
         parameters=_parameters_text(gait, scenario),
-        weights=dict(zip(gait.weight_names, gait.weights, strict=True))
-        if isinstance(gait, Gait)
-        else {},
+        weights={
+            name.removeprefix(_WEIGHT): weight
+            for name, weight in gait.parameters.items()
+            if name.startswith(_WEIGHT)
+        },
         differences=differences,
         files={
             "scenario": SCENARIO,

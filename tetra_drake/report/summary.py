@@ -19,7 +19,7 @@ from tetra_drake.robot.remarks import (
     yielding_remark,
 )
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.common_sections import separate
+from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.metrics import (
     METRICS,
     UNITS,

@@ -18,13 +18,13 @@ from tetra_drake import __version__
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Say, fixed, heading_html, silent, uncertain
 from tetra_drake.laws.tally import Tally
+from tetra_drake.on_demand import loaded
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
-from tetra_drake.robot.gait import AnyGait
+from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.measures import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
-from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.metrics import (
     MOVED,
@@ -37,7 +37,8 @@ from tetra_drake.scenario.metrics import (
     has_rolled,
     headline_metric,
 )
-from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.scenario import Scenario, scenario_of
+from tetra_drake.scenario.simulation import SimulationSection
 from tetra_drake.settings.section import Section
 
 if TYPE_CHECKING:
@@ -67,8 +68,8 @@ class SimulationResult:
     """The simulated robot; without a network if it followed a command."""
     name: str
     """Name of the gait or command."""
-    gait: AnyGait | None = field(repr=False, compare=False)
-    """The gait, or the parameters of a policy; None for a command."""
+    gait: Gait | None = field(repr=False, compare=False)
+    """The gait; None for a command or a controller."""
     metrics: Metrics
     fitness: float
     duration: float
@@ -154,9 +155,8 @@ class SimulationResult:
         say: Say = silent,
     ) -> None:
         """Writes a video of the motion to the file `path`, an MP4 or a GIF. For the arguments and
-        errors, see visualization.video.make_video()."""
-        from tetra_drake.visualization.video import make_video
-
+        errors, see lab.films.video.make_video()."""
+        make_video = loaded("tetra_drake.lab.films.video:make_video")
         page = self.replay_page()
         make_video(page, Path(path), size=size, fps=fps, view=view, speed=speed, say=say)
 
@@ -204,7 +204,7 @@ def make_result(
         wall_time: wall time of the integration in s.
         record: whether the result has a trajectory.
     """
-    robot = driven.robot
+    robot, scenario = driven.robot, scenario_of(driven.robot.scenario)
     simulation, structure = robot.scenario.simulation, robot.structure
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
@@ -220,16 +220,16 @@ def make_result(
         signals=way.signals[instants >= simulation.settling_time],
     )
     return SimulationResult(
-        scenario=robot.scenario,
+        scenario=scenario,
         robot=robot,
         name=driven.name,
-        gait=driven.gait if driven.pilot is None else driven.pilot.parameters,
+        gait=driven.gait,
         metrics=metrics,
-        fitness=compute_fitness(metrics, robot.scenario.objective),
+        fitness=compute_fitness(metrics, scenario.objective),
         duration=simulation.duration,
         wall_time=wall_time,
         integrator=work,
-        engine=robot.scenario.engine_name,
+        engine=scenario.engine_name,
         path=path,
         recorded=make_dataset(robot, motion.at(samples)) if record else None,
         tally=totals,

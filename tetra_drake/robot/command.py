@@ -14,11 +14,12 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError, check_type, checked_numbers
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.gait import AnyGait, PolicyParameters, with_body
-from tetra_drake.robot.network import SteeringSignal, usual_amplitude
+from tetra_drake.robot.gait import Gait, check_parameters
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot, LoopLaw, Pilot
+from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.scenario.policies import DrivenRobots
 from tetra_drake.scenario.scenario import Scenario
 
@@ -57,8 +58,8 @@ class Command:
 Controller = Callable[[float, Readings], npt.ArrayLike]
 """Function from the time (s) and the readings of one robot to its actions (actions,)."""
 
-Driver = AnyGait | Command
-"""A gait, a policy's parameters or a command: what drives the actuators without a controller."""
+Driver = Gait | Command
+"""A gait or a command: what drives the actuators without a controller."""
 
 
 def driven_robot(
@@ -76,29 +77,23 @@ def driven_robot(
     `robot` is the scenario's robot if it is made already.
 
     Raises InputError for a command without samples, or whose number of cables is not the robot's
-    number of driven cables. Also for a gait if the scenario has a policy, for parameters of a
-    policy that it does not have, and for steering of a policy. The robot of a gait with a body has
-    this body.
+    number of driven cables. Also for a gait with other parameters than the scenario's oscillators
+    or policy, and for steering of a policy. The robot of a gait with a body has this body.
     """
     if not isinstance(driver, Command) and driver.body:
         scenario, driver = with_body(scenario, driver)
         robot = None
     robot = robot or Robot.of(scenario)
-    if isinstance(driver, PolicyParameters):
+    if not isinstance(driver, Command):
+        if scenario.policy is None:
+            return DrivenRobot.of(robot, driver, steering=steering)
         if steering is not None:
             raise InputError("steering", "", f"found a function, and {driver.name} is for a policy")
-        policy, count = scenario.policy, len(scenario.policy_parameters)
-        if policy is None or len(driver.values) != count:
-            problem = f"found {len(driver.values)}, scenario {scenario.name} has {count}"
-            raise InputError(f"policy {driver.name}", "parameters", problem)
-        step = scenario.cpg.listing_step
+        source, own = f"gait {driver.name}", scenario.parameters
+        given = check_parameters(driver.parameters, own, source=source, key="parameters")
+        values, step = np.array([*given.values()], dtype=float), scenario.cpg.listing_step
         period = step * round(scenario.simulation.control_period / step)
-        return _looped(robot, policy.signals, period, name=driver.name, parameters=driver)
-    if not isinstance(driver, Command):
-        if scenario.policy is not None:
-            expected = f"expected parameters of a policy, which scenario {scenario.name} has"
-            raise InputError(f"gait {driver.name}", "", f"found a gait, {expected}")
-        return DrivenRobot.of(robot, driver, steering=steering)
+        return _looped(robot, scenario.policy.signals, values, period, gait=driver)
     robot = robot.without_network()
     driver.check(robot)
     step = scenario.cpg.listing_step
@@ -130,8 +125,8 @@ def robot_of_controller(
         given, shape = controller(float(one.time), one), robots.rest.shape
         return robots.signals_of(checked_actions(given, shape, source="controller", finite=True))
 
-    name, period = getattr(controller, "__name__", "controller"), checked_period(period, scenario)
-    return _looped(Robot.of(scenario), law, period, name=name)
+    driven = _looped(Robot.of(scenario), law, np.zeros(0), checked_period(period, scenario))
+    return dataclasses.replace(driven, name=getattr(controller, "__name__", "controller"))
 
 
 def checked_period(period: float | None, scenario: Scenario) -> float:
@@ -162,15 +157,10 @@ def checked_actions(
 
 
 def _looped(
-    robot: Robot,
-    law: LoopLaw,
-    period: float,
-    *,
-    name: str,
-    parameters: PolicyParameters | None = None,
+    robot: Robot, law: LoopLaw, values: np.ndarray, period: float, *, gait: Gait | None = None
 ) -> DrivenRobot:
     """A robot that a policy or a controller drives, whose first signals act from the start on. For
-    the arguments see Pilot."""
+    the arguments see Pilot; `gait` is None for a controller."""
     scenario, controlled, structure = robot.scenario, robot.controlled, robot.structure
     cables, struts = robot.starting_cables(), structure.p_WN[structure.struts]
     size = np.linalg.norm(np.diff(struts[0], axis=0)) if len(struts) else scenario.robot.size
@@ -179,16 +169,17 @@ def _looped(
         ends=structure.cable_ends[robot.driven],
         cables=cables,
         rest=scenario.actuation.commands(cables),
-        amplitude=np.array(usual_amplitude(scenario.cpg)),
+        amplitude=np.array(scenario.cpg.usual_amplitude),
         lengths=structure.initial_lengths,
         weight=np.array(robot.weight),
         size=np.array(size),
     )
     end = scenario.simulation.duration
-    pilot = Pilot(law=law, parameters=parameters, robots=robots, period=period, end=end)
-    first = signals_of_one(pilot, first_readings(controlled))
-    controlled = dataclasses.replace(controlled, first_signals=first)
-    return DrivenRobot(robot=controlled, name=name, samples=first[np.newaxis], pilot=pilot)
+    pilot = Pilot(law=law, values=values, robots=robots, period=period, end=end)
+    samples = signals_of_one(pilot, first_readings(controlled))[np.newaxis]
+    controlled = dataclasses.replace(controlled, first_signals=samples[0])
+    name = gait.name if gait else ""
+    return DrivenRobot(robot=controlled, name=name, samples=samples, gait=gait, pilot=pilot)
 
 
 def signals_of_one(pilot: Pilot, readings: Readings) -> np.ndarray:
@@ -208,7 +199,7 @@ def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
         some = [pilots[row] for row in rows]
         arrays = [pilot.robots[2:] for pilot in some]
         together = DrivenRobots(*some[0].robots[:2], *_stacked(arrays))
-        values = np.array([pilot.parameters.values if pilot.parameters else () for pilot in some])
+        values = np.array([pilot.values for pilot in some])
         signals[rows] = some[0].law(together, readings.rows(rows), values)
     return signals
 

@@ -11,7 +11,7 @@ from tetra_drake.laws.friction import FrictionKind
 from tetra_drake.laws.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.laws.terrain import Grid, Relief
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 from tetra_drake.settings.units import INCH
 
 STEP_AHEAD = 1.0 * INCH
@@ -24,7 +24,7 @@ START_DEPTH = 1e-6
 foot may also be as deep as the weight would press it, because a robot may start in equilibrium."""
 
 
-def lift(scenario: Scenario, placed: Structure) -> float:
+def lift(scenario: World, placed: Structure) -> float:
     """Distance (m) by which a structure must move up so that its lowest foot touches the plane
     z = 0; negative for down.
 
@@ -48,7 +48,7 @@ def lift(scenario: Scenario, placed: Structure) -> float:
     return max(0.0, lift) if placed.held.any() else lift
 
 
-def make_ground(scenario: Scenario, structure: Structure) -> Ground:
+def make_ground(scenario: World, structure: Structure) -> Ground:
     """Ground of a scenario below a structure in its initial pose, as an argument of the compiled
     kernels: laws, heights and contact nodes.
 

@@ -12,11 +12,11 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import rounded
 from tetra_drake.laws import cable
-from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.blueprint import SAGS
 from tetra_drake.scenario.metrics import looks_for_distance
+from tetra_drake.scenario.scenario import scenario_of
 
 LEAST_MOTION = 0.01
 """Least change of a cable's length that signals should cause, as a share of the length."""
@@ -55,7 +55,7 @@ def stillness_remark(robot: Robot, metrics: Mapping[str, float]) -> str:
     a tenth of its own length, with the likely reason. `metrics` are by name, in SI units. It is ""
     otherwise."""
     scenario, units = robot.scenario, robot.scenario.units
-    distance, objective = metrics["distance"], scenario.objective
+    distance, objective = metrics["distance"], scenario_of(scenario).objective
     is_to_move = looks_for_distance(objective) or objective.get("rolled", 0.0) > 0.0
     if not is_to_move or not abs(distance) < STILL * robot.structure.length:
         return ""
@@ -137,5 +137,5 @@ def _usual_signal(robot: Robot) -> tuple[float, np.ndarray]:
     """Typical amplitude (N) of a network's signals, and the elastic stretch (driven cables,) in m
     of each driven cable under a force of this size."""
     cpg, law = robot.scenario.cpg, cable.CableLaw.of(robot.structure.cables[robot.driven])
-    signal = usual_amplitude(cpg)
+    signal = cpg.usual_amplitude
     return signal, np.asarray(cable.elastic_stretch(signal, law))

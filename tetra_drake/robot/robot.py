@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -20,7 +20,7 @@ from tetra_drake.laws.feedback import Senses
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Bodies, Model
-from tetra_drake.laws.oscillator import Network, steered_input
+from tetra_drake.laws.oscillator import GaitParameter, Oscillators, steered_input
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.bodies import body_inertias
 from tetra_drake.robot.equilibrium import (
@@ -31,9 +31,9 @@ from tetra_drake.robot.equilibrium import (
     mass_matrix,
     stiffness_at_rest,
 )
-from tetra_drake.robot.gait import Gait, check_gait
+from tetra_drake.robot.gait import Gait, check_parameters
 from tetra_drake.robot.ground import lift, make_ground
-from tetra_drake.robot.network import SteeringSignal, Weights, checked_turn
+from tetra_drake.robot.steering import SteeringSignal, checked_turn
 from tetra_drake.robot.structure import Structure, with_origins
 from tetra_drake.robot.struts import (
     axial_forces,
@@ -43,7 +43,7 @@ from tetra_drake.robot.struts import (
     strut_contact_law,
 )
 from tetra_drake.scenario.events import Event, blueprint_after, up_to_each
-from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 
 MOST_CORRECTIONS = 100
 """Largest number of corrections of the lengths of elastic struts, in the search for equilibrium."""
@@ -58,7 +58,7 @@ class Robot:
     """A robot of a scenario on its ground at t = 0: what an engine needs for a simulation, except
     a gait or other signals."""
 
-    scenario: Scenario
+    scenario: World
     structure: Structure
     model: Model
     """Constants of bodies, cables and ground, as arguments of the compiled kernels."""
@@ -70,7 +70,7 @@ class Robot:
     """The robot at t = 0, if this one is what events have left of it; otherwise None."""
 
     @classmethod
-    def of(cls, scenario: Scenario, *, at_rest: bool = False) -> Self:
+    def of(cls, scenario: World, *, at_rest: bool = False) -> Self:
         """The robot of a scenario at its start: in equilibrium if its settings say so, then moved
         by the offsets of its bodies, on the scenario's terrain.
 
@@ -247,22 +247,24 @@ class Robot:
         )
         return Phase(events[-1].at, robot, p_BC)
 
-    def network(self, gait: Gait) -> Network:
-        """Constants of the oscillator network that a gait gives this robot. Raises InputError if
-        the gait does not fit the scenario."""
+    def oscillators(self, gait: Gait) -> Oscillators:
+        """Oscillators with the numbers of a gait, for kernels. Raises InputError if the gait does
+        not fit the scenario."""
         cpg = self.scenario.cpg
-        weights = Weights(self.structure, cpg.reach)
-        check_gait(gait, self.scenario, weights, source=f"gait {gait.name}")
-        neurons = np.arange(2 * self.structure.signals)
-        inhibition = np.zeros((neurons.size, neurons.size))
-        inhibition[neurons, neurons ^ 1] = cpg.partner_weight
-        inhibition[tuple(weights.couplings.T)] = gait.weights
-        return Network.of(
-            inhibition,
-            tau_a=gait.tau_a,
-            tau_b=gait.tau_b,
-            self_inhibition_weight=cpg.self_inhibition_weight,
-        )
+        return Oscillators(cpg.own, cpg.constants(self.structure, self._checked(gait)))
+
+    def starting_oscillators(self, gait: Gait) -> np.ndarray:
+        """States (s,) of the oscillators at t = 0. Raises InputError as oscillators()."""
+        return self.scenario.cpg.starting_state(self.structure, self._checked(gait))
+
+    @functools.cached_property
+    def _parameters(self) -> Mapping[str, GaitParameter]:
+        return self.scenario.cpg.parameters(self.structure)
+
+    def _checked(self, gait: Gait) -> dict[str, float]:
+        """Parameters of a gait, by name. Raises InputError if they do not fit the oscillators."""
+        source = f"gait {gait.name}"
+        return check_parameters(gait.parameters, self._parameters, source=source, key="parameters")
 
     def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
         """Turns, -1 to 1: how much more input left oscillators have than right ones.
@@ -273,18 +275,19 @@ class Robot:
         InputError if a value is not between -1 and 1, or if no oscillator is on one side of the
         robot.
         """
+        if (steering or gait.turn) and not self.structure.sides.any():
+            source = "steering" if steering else f"gait {gait.name}"
+            raise InputError(source, "", "turns, but no oscillator is on one side of the robot")
         if steering is None:
             return np.array([gait.turn])
-        if not self.structure.sides.any():
-            raise InputError("steering", "", "no oscillator is on one side of the robot")
         step = self.scenario.cpg.listing_step
         times = step * np.arange(round(self.scenario.simulation.duration / step) + 1)
         return np.array([checked_turn(steering(time), time=time) for time in times.tolist()])
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
-        """Tonic input of each of the 2m neurons (..., 2m), for turns (...) from -1 to 1. It is
-        u0 (1 + turn) on the left, u0 (1 - turn) on the right, u0 for neither side."""
-        sides, u0 = np.repeat(self.structure.sides, 2), self.scenario.cpg.external_input
+        """Tonic input of both inputs of m oscillators (..., 2m), for turns (...) from -1 to 1. It
+        is u0 (1 + turn) on the left, u0 (1 - turn) on the right, u0 for neither side."""
+        sides, u0 = np.repeat(self.structure.sides, 2), self.scenario.cpg.tonic
         return np.asarray(steered_input(u0, turns[..., np.newaxis], sides))
 
     def starting_drives(self) -> np.ndarray:
@@ -328,13 +331,13 @@ class Phase:
     in the frames that they have at t = 0."""
 
 
-def _placed(scenario: Scenario) -> Structure:
+def _placed(scenario: World) -> Structure:
     """The structure of a scenario's robot at the positions of its settings, before any search for
     equilibrium. It has no contact nodes if the scenario has no ground."""
     return Structure.of(scenario.blueprint())
 
 
-def _settled(scenario: Scenario, placed: Structure, model: Model) -> tuple[Structure, Model]:
+def _settled(scenario: World, placed: Structure, model: Model) -> tuple[Structure, Model]:
     """Moves a structure into equilibrium on flat ground. Returns the moved structure and its model.
 
     `placed` and `model` are the structure and its model at the positions of the settings. Elastic
@@ -371,7 +374,7 @@ def _settled(scenario: Scenario, placed: Structure, model: Model) -> tuple[Struc
 
 
 def equilibrium_of(
-    scenario: Scenario, structure: Structure, start: np.ndarray | None = None
+    scenario: World, structure: Structure, start: np.ndarray | None = None
 ) -> Equilibrium:
     """Equilibrium of a structure without actuation, on flat ground if it has contact nodes.
 
@@ -383,7 +386,7 @@ def equilibrium_of(
     return find_equilibrium(model, start, bodies=structure.bodies, source=scenario.name)
 
 
-def make_model(scenario: Scenario, structure: Structure) -> Model:
+def make_model(scenario: World, structure: Structure) -> Model:
     """Constants of a robot as arguments of the compiled kernels: its structure, and the physical
     laws of the scenario. Raises InputError if the structure starts in the ground or outside the
     terrain; see make_ground()."""

@@ -11,18 +11,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
-from tetra_drake.laws.feedback import Gains
-from tetra_drake.laws.oscillator import Network, make_neurons, network_output
-from tetra_drake.robot.gait import AnyGait, Gait, PolicyParameters, network_gait
-from tetra_drake.robot.network import SteeringSignal, initial_neurons
-from tetra_drake.robot.readings import Readings
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws.feedback import PATHWAYS
+from tetra_drake.laws.matsuoka import NO_NETWORK, Matsuoka
+from tetra_drake.laws.oscillator import Oscillators, make_states, write_outputs
+from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.scenario.policies import DrivenRobots
 
 MARK_DECIMALS = 9
@@ -30,8 +31,8 @@ MARK_DECIMALS = 9
 rounding would be too short."""
 
 
-LoopLaw = Callable[[DrivenRobots, Readings, np.ndarray], np.ndarray]
-"""Function from the constants of N robots, their readings and the parameters (N, parameters) of a
+LoopLaw = Callable[[DrivenRobots, Any, np.ndarray], np.ndarray]
+"""Function from the constants of N robots, their Readings and the parameters (N, parameters) of a
 policy to their signals (N, m) in N; see PolicyKind.signals()."""
 
 
@@ -40,8 +41,8 @@ class Pilot:
     """Closed loop that drives a robot: a policy with its parameters, or a controller."""
 
     law: LoopLaw
-    parameters: PolicyParameters | None
-    """Parameters of a policy; None for a controller."""
+    values: np.ndarray
+    """Parameters (parameters,), in the order of Scenario.parameters; none of a controller."""
     robots: DrivenRobots
     """Constants of the one robot, without the axis of robots."""
     period: float
@@ -70,28 +71,33 @@ class DrivenRobot:
     """Name of the source of the signals."""
     samples: np.ndarray
     """Given signals (k, m) in N at multiples of `cpg.listing_step`, linear in between. The last
-    ones are held. A controller gives the first ones, a command at least two, a gait none."""
+    ones are held. A controller or a policy gives the first ones, a command at least two,
+    oscillators none."""
     gait: Gait | None = None
-    """The gait whose network makes the signals; None if they are given."""
+    """The gait whose oscillators or policy make the signals; None if they are given."""
     steering: SteeringSignal | None = None
     """Function from time to the turn, -1 to 1, in place of the gait's turn; None for the gait's."""
     pilot: Pilot | None = None
     """The policy or controller that sets the signals while the robot moves; None without one."""
 
     @classmethod
-    def of(cls, robot: Robot, gait: AnyGait, *, steering: SteeringSignal | None = None) -> Self:
-        """A robot driven by the network of a gait. `steering`, a function from time (s) to the turn
-        (-1 to 1), replaces the gait's constant turn. Raises InputError for parameters of a policy;
-        see robot.command.driven_robot()."""
-        gait = network_gait(gait)
+    def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
+        """A robot driven by the oscillators of a gait. `steering`, a function from time (s) to the
+        turn (-1 to 1), replaces the gait's constant turn. For a policy see
+        robot.command.driven_robot()."""
         none = np.zeros((0, robot.structure.signals))
         return cls(robot=robot, name=gait.name, samples=none, gait=gait, steering=steering)
 
     @property
+    def oscillating(self) -> Gait | None:
+        """The gait if its oscillators make the signals; None for a policy and for given signals."""
+        return None if self.pilot else self.gait
+
+    @property
     def start_up(self) -> float:
-        """Time (s) from which the signals act: `cpg.start_up` for a gait, otherwise 0. Before it
-        they are zero."""
-        return self.robot.scenario.cpg.start_up if self.gait else 0.0
+        """Time (s) from which the signals act: `cpg.start_up` for oscillators, otherwise 0. Before
+        it they are zero."""
+        return self.robot.scenario.cpg.start_up if self.oscillating else 0.0
 
     @property
     def steady_start(self) -> float:
@@ -103,13 +109,13 @@ class DrivenRobot:
     def is_live(self) -> bool:
         """True if a network is integrated together with the robot's motion (`cpg.signals: live`).
         False if its signals are computed beforehand, or given."""
-        return self.gait is not None and self.robot.scenario.cpg.signals == "live"
+        return bool(self.oscillating) and self.robot.scenario.cpg.signals == "live"
 
     @property
     def sample_count(self) -> int:
         """Number of samples of the signals, one per `cpg.listing_step`: of the given ones, or of
         the network's output."""
-        if self.gait is None:
+        if self.oscillating is None:
             return len(self.samples)
         scenario = self.robot.scenario
         steps = scenario.simulation.duration / scenario.cpg.listing_step
@@ -131,9 +137,8 @@ class DrivenRobot:
     def _all_samples(self) -> np.ndarray:
         """Samples (k, m) in N of the signals at multiples of `cpg.listing_step`: the given ones, or
         a network's output."""
-        if self.gait is None:
-            return self.samples
-        return signal_samples(self.robot, self.gait, self.steering)
+        gait = self.oscillating
+        return self.samples if gait is None else signal_samples(self.robot, gait, self.steering)
 
     @property
     def changes(self) -> dict[float, np.ndarray]:
@@ -161,25 +166,37 @@ class DrivenRobot:
         return np.append(before, settings.duration)
 
     @property
-    def network(self) -> Network:
-        """Network that makes the signals. It has no neurons if the signals are given."""
-        if self.gait is not None:
-            return self.robot.network(self.gait)
-        return Network.of(np.zeros((0, 0)), tau_a=1.0, tau_b=1.0, self_inhibition_weight=0.0)
+    def oscillators(self) -> Oscillators:
+        """Oscillators that make the signals; none if they are given."""
+        if self.oscillating is not None:
+            return self.robot.oscillators(self.oscillating)
+        return Oscillators(Matsuoka.own, NO_NETWORK)
+
+    @property
+    def starting_state(self) -> np.ndarray:
+        """States (s,) of the oscillators at t = 0; none if the signals are given."""
+        gait = self.oscillating
+        return self.robot.starting_oscillators(gait) if gait else np.zeros(0)
 
     @property
     def gains(self) -> np.ndarray:
         """Gains of the network's feedback, one for each pathway in the order of
         laws.feedback.PATHWAYS; zeros without feedback or network."""
-        gains = self.gait.gains if self.gait else Gains()
-        return np.array([gain for _, gain in gains])
+        return gains_of(self.oscillating)
 
     @property
     def turns(self) -> np.ndarray:
         """Turns, -1 to 1, at multiples of `cpg.listing_step`: how much more input left oscillators
         have than right ones, see Robot.turns(). One value if the turn is constant; a single 0
         without a gait."""
-        return self.robot.turns(self.gait, self.steering) if self.gait else np.zeros(1)
+        gait = self.oscillating
+        return self.robot.turns(gait, self.steering) if gait else np.zeros(1)
+
+
+def gains_of(gait: Gait | None) -> np.ndarray:
+    """Gains of a gait's feedback, one for each pathway in the order of laws.feedback.PATHWAYS."""
+    parameters = gait.parameters if gait else {}
+    return np.array([parameters.get(f"gain {name}", 0.0) for name in PATHWAYS])
 
 
 def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
@@ -199,22 +216,19 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
     its signals depend on the robot's motion.
     """
     cpg, oscillators = robot.scenario.cpg, robot.structure.signals
-    if any(gain for _, gain in gait.gains):
+    if gains_of(gait).any():
         problem = "has feedback; its signals exist only while the robot is simulated"
         raise InputError(f"gait {gait.name}", "gains", problem)
-    network, turns = robot.network(gait), robot.turns(gait, steering)
+    turns = robot.turns(gait, steering)
     midway = 0.5 * (turns[:-1] + turns[1:]) if turns.size > 1 else turns
     inputs = robot.tonic_input(midway)
-    neurons = make_neurons(initial_neurons(cpg, oscillators))
+    parts = Packed((robot.oscillators(gait), make_states(robot.starting_oscillators(gait))))
     output = np.empty((DrivenRobot.of(robot, gait).sample_count, oscillators))
-    listing = cpg.signals == "listing"
-    network_output(network, inputs, cpg.listing_step, listing, neurons, output)
+    write_outputs(parts, inputs, cpg.listing_step, cpg.signals == "listing", output)
     return cpg.gain * np.vstack([output, output[-1:], output[-1:]])
 
 
-def save_signals(
-    path: str | Path, robot: Robot, gait: AnyGait, *, rate: float | None = None
-) -> None:
+def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | None = None) -> None:
     """Writes the signals of a gait without feedback to the CSV file `path`, with the columns
     time_s, signal_1 ... signal_m.
 

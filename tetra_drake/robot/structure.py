@@ -152,9 +152,9 @@ class Structure(Blueprint):
 
     @property
     def anchors(self) -> AnchorSprings:
-        """Springs and dampers that hold nodes of bodies at their positions in the settings; only
-        the nodes with such ones."""
-        nodes = np.flatnonzero((self.anchor_stiffness + self.anchor_damping).any(axis=1))
+        """Springs that hold nodes of bodies at their positions in the settings; only the nodes with
+        such a spring."""
+        nodes = np.flatnonzero(self.anchor_stiffness.any(axis=1))
         return AnchorSprings(
             nodes,
             carriers=self.carriers[nodes],
@@ -320,3 +320,18 @@ def AddFrame(plant: MultibodyPlant, name: str, parent: Frame, p: npt.ArrayLike) 
     position p (3,) in m, with the axes of `parent`."""
     offset = RigidTransform(np.asarray(p, dtype=float))
     return plant.AddFrame(FixedOffsetFrame(name, parent, offset))
+
+
+def node_motions(structure: Structure, state: np.ndarray, motions: np.ndarray) -> np.ndarray:
+    """Displacements (k, nodes, 3) of a structure's nodes, in the world frame, for k small motions
+    of its bodies (k, bodies, 6) from a state [q; v] (13*bodies,). A motion has a rotation vector
+    (rad), then a translation (m), for each body. Fixed nodes do not move."""
+    p_WN = node_positions(structure, state)
+    p_WB = state[: 7 * len(structure.bodies)].reshape(-1, 7)[:, 4:]
+    moved = np.zeros((len(motions), *p_WN.shape), dtype=motions.dtype)
+    for body, p_WO in enumerate(p_WB):
+        own = slice(structure.first_node[body], structure.first_node[body + 1])
+        moved[:, own] = np.einsum(
+            "nij,kj->kni", kinematics.rigid_motions(p_WN[own] - p_WO), motions[:, body]
+        )
+    return moved

@@ -22,7 +22,7 @@ from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
 from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.world import World
 
 SKIN = 0.05
 """Gap at which two struts count as near, as a share of the shortest strut. With a larger one, more
@@ -36,7 +36,7 @@ ELONGATION = 1e-6
 """Elongation of a strut for finite differences, as a share of its length."""
 
 
-def strut_contact_law(scenario: Scenario, structure: Structure) -> StrutContactLaw:
+def strut_contact_law(scenario: World, structure: Structure) -> StrutContactLaw:
     """Constants of the contact between struts for the kernels: its law, and the distances that
     decide which pairs of struts are checked. Its field `acts` is False without struts: then the
     kernels check none."""
@@ -50,7 +50,7 @@ def strut_contact_law(scenario: Scenario, structure: Structure) -> StrutContactL
     return scenario.strut_contact.law(search)
 
 
-def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool = False) -> None:
+def check_apart(scenario: World, structure: Structure, *, may_overlap: bool = False) -> None:
     """Raises InputError if struts of different bodies overlap in the initial pose of a structure,
     unless the robot's weight would press them as deep into each other.
 
@@ -72,7 +72,7 @@ def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool =
 
 
 def overlaps(
-    scenario: Scenario, structure: Structure, state: np.ndarray
+    scenario: World, structure: Structure, state: np.ndarray
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Overlaps of struts of different bodies in a state [q; v] (13*bodies,).
 

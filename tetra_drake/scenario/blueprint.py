@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -109,7 +109,7 @@ class Blueprint:
     """Stiffness (nodes, 3) of the springs that hold the nodes of bodies along x, y and z; 0 along a
     free axis."""
     anchor_damping: np.ndarray
-    """Damping (nodes, 3) of the nodes of bodies along x, y and z."""
+    """Damping (nodes, 3) of the springs that hold the nodes of bodies along x, y and z."""
     payload: np.ndarray
     """Point masses at the centres of mass of the bodies (bodies,)."""
     offsets: np.ndarray
@@ -164,6 +164,19 @@ class Blueprint:
     def carriers(self) -> np.ndarray:
         """Index of the body that each node belongs to (nodes,); WORLD (-1) for a fixed node."""
         return carriers_of(self.first_node, nodes=len(self.node_names))
+
+    @functools.cached_property
+    def distances(self) -> np.ndarray:
+        """Distances (m, m) between the m oscillators: 0 if their cables join the same bodies, 1 if
+        they share a body, 2 if both are at distance 1 of a third, and so on."""
+        from scipy.sparse.csgraph import shortest_path
+
+        joined = [self.bodies_at(cables) for cables in self.groups]
+        shape = len(joined), len(joined)
+        near = np.array([[bool(a & b) for b in joined] for a in joined]).reshape(shape)
+        same = np.array([[a == b for b in joined] for a in joined]).reshape(shape)
+        steps = np.minimum(shortest_path(near, unweighted=True), len(joined))
+        return np.where(same, 0.0, steps)
 
     @functools.cached_property
     def segments(self) -> Segments:
@@ -439,3 +452,13 @@ class Blueprint:
     @property
     def _least_distance(self) -> float:
         return TOLERANCE * float(np.linalg.norm(np.ptp(self.p_WN, axis=0)))
+
+
+def cable_numbers(names: Iterable[str]) -> dict[str, int]:
+    """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its nodes
+    in either order."""
+    numbers: dict[str, int] = {}
+    for number, name in enumerate(names):
+        group, *nodes = name.split()
+        numbers[name] = numbers[" ".join((group, *nodes[::-1]))] = number
+    return numbers

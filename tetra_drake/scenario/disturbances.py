@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.events import Event
+from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.scenario import Scenario
 
 IterationSeed = tuple[int, int, int]

@@ -10,7 +10,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import SCENARIOS, shipped_scenarios
-from tetra_drake.scenario.structure_files import structure_file
+from tetra_drake.scenario.structure_files import structure_file, with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 from tetra_drake.settings.refusals import no_such
 from tetra_drake.settings.section import keys_of, written
@@ -107,7 +107,7 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
 
     base = given.pop("base", None)
     if base is None:
-        return Scenario.from_tree(given, file)
+        return Scenario.from_tree(with_structure(given, file), file)
     if not isinstance(base, str) or not base:
         raise InputError(file, "base", f"found {base!r}, expected the name of a scenario")
     base_file = _file(base, file.parent)

@@ -1,72 +1,46 @@
-"""Scenario: all settings of an experiment, and the rules between its sections."""
+"""Scenario: a world, and an experiment about it."""
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import itertools
 import json
-import math
 import operator
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.formatting import TextTable, heading_html, listed
-from tetra_drake.laws.actuator import Actuation, Force
-from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
-from tetra_drake.laws.contact import GroundSection
-from tetra_drake.laws.friction import Friction
-from tetra_drake.laws.oscillator import CpgSection
-from tetra_drake.laws.terrain import Flat, Terrain
-from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.changes import merged, tree_of_changes
-from tetra_drake.scenario.common_sections import (
+from tetra_drake.laws.oscillator import GaitBounds, GaitParameter
+from tetra_drake.scenario.experiment_sections import (
     BODY_SECTIONS,
     BodyBounds,
     Disturbances,
     EvolutionSection,
-    GaitBounds,
-    SimulationSection,
-    different_keys,
-    separate,
 )
-from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
-from tetra_drake.scenario.events import Event, check_taken, up_to_each
+from tetra_drake.scenario.joined_keys import different_keys, separate
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
-from tetra_drake.scenario.policies import Policy, PolicyBounds
-from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
-from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.tolerances import (
     Tolerance,
     Tolerances,
     check_tolerances,
     split_tolerances,
 )
+from tetra_drake.scenario.world import World
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import by_name
 from tetra_drake.settings.refusals import TAG, described, hint, refuse
-from tetra_drake.settings.section import Section, Tree, flattened, value_at, written
+from tetra_drake.settings.section import value_at, written
 from tetra_drake.settings.units import (
-    SYSTEMS,
-    Units,
-    current,
-    fitting,
     plainest,
     shortest,
 )
-
-EngineT = TypeVar("EngineT", Drake, Compiled, Mujoco)
-
-MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
-"""Largest number of values of all signals in one simulation, on Drake and on other engines. They
-need about 3 GB."""
 
 _WIDTH, _ROWS = 100, 20
 """Largest number of characters in a line of a printed scenario, and of rows in a notebook."""
@@ -74,57 +48,36 @@ _WIDTH, _ROWS = 100, 20
 _OF_WEIGHTS = {name: inverse(unit) for name, unit in UNITS.items()}
 """Units of the weights in an objective, by metric."""
 
-CHANGEABLE = "friction.", "ground."
-"""First parts of the keys whose numbers an event may change."""
 
-MOST_SAMPLES = 2_000_000
-"""Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
-
-
-class Scenario(Section):
-    """Scenario: all settings of an experiment except the gait."""
+class Scenario(World):
+    """Scenario: a world, and an experiment about it: all settings except the gait."""
 
     model_config = ConfigDict(defer_build=True)
 
     keys_of_files: ClassVar = {"base": "Name or file of a scenario that has the other values."}
 
-    format: Literal[1] = 1
-    """Version of the format of the file."""
-    name: str
-    """Label of the scenario; equal scenarios may have different names."""
-    robot: RobotKind
-    ground: GroundSection
-    friction: Friction
-    terrain: Terrain = Flat()
-    strut_contact: StrutContactKind = NoStrutContact()
-    actuation: Actuation = Force()
-    cpg: CpgSection
-    policy: Policy | None = Field(default=None, exclude_if=lambda policy: policy is None)
-    """A closed loop in place of the oscillator network; evolution searches its parameters. An empty
-    key removes the base's."""
     gait_bounds: GaitBounds
     evolve: Annotated[BodyBounds, Field(exclude_if=operator.not_)] = Field(default={})
-    """Bounds of the numbers of the robot that evolve together with the gait, by scenario key, such
-    as `robot.cables.side.stiffness: [50 N/m, 400 N/m]` or `robot.nodes.n3[2]` for a coordinate z.
-    Keys that are joined by commas get the same value. Each candidate is a robot of its own, at its
-    own equilibrium. Equal bounds fix a number. A file replaces all bounds of its base."""
-    simulation: SimulationSection
-    engine: EngineKind = Drake()
+    """Bounds of numbers of the robot that evolve with the gait, by scenario key, such as
+    `robot.cables.side.stiffness: [50 N/m, 400 N/m]`, or `robot.nodes.n3[2]` for a coordinate z.
+    Keys joined by commas get the same value. Equal bounds fix a number. A file replaces all bounds
+    of its base."""
     objective: Annotated[dict[str, float], *by_name(_OF_WEIGHTS), Field(min_length=1)]
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
     require: Annotated[dict[str, float], *by_name(UNITS)] = Field(default={})
     """Limits of metrics: a gait that does not meet one counts as failed. A file replaces all limits
     of its base."""
-    events: list[Event] = Field(default=[], exclude_if=operator.not_)
-    """Changes of robot or ground during the simulation, such as a cable that breaks."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers by scenario key, such as `ground.stiffness: 20 % uniform`, besides the
-    robot's; or in the text of a number, such as `20 kN/m ± 20 %`. They do not change a simulation;
-    td.predict and td.fit use them."""
+    """Tolerances of numbers besides the robot's, by scenario key, such as `ground.stiffness: 20 %
+    uniform`; or in the text of a number: `20 kN/m ± 20 %`."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()
+
+    def undisturbed(self) -> Self:
+        """A copy without events and disturbances."""
+        return self.with_sections(events=[], disturbances=None)
 
     def __str__(self) -> str:
         """Summary in a few lines, with the settings that differ from the scenario `thesis`."""
@@ -187,24 +140,6 @@ class Scenario(Section):
                 break
         return found
 
-    def values(self) -> dict[str, Any]:
-        """Values by dotted keys, without the scenario's name. Scenarios with the same values are
-        equal; the name is only a label."""
-        return flattened(self.model_dump(exclude={"format", "name"}))
-
-    @property
-    def units(self) -> Units:
-        """Units of this scenario in texts, pages and figures: the units that units.shown_in()
-        sets, if it is in use; otherwise mm if the robot is given in mm; otherwise the units that
-        need the fewest digits for the long lengths of the robot."""
-        robot = self.robot
-        return current(SYSTEMS[robot.unit] if robot.unit else fitting(robot.lengths))
-
-    @property
-    def oscillators(self) -> int:
-        """Number of oscillators."""
-        return len(self.robot.blueprint().oscillators)
-
     @property
     def all_tolerances(self) -> Mapping[str, Tolerance]:
         """Tolerances of the robot and of the scenario, by scenario key. Raises InputError if a
@@ -216,125 +151,22 @@ class Scenario(Section):
         return different_keys(of_robot | self.tolerances, source=f"scenario {self.name}")
 
     @property
-    def engine_name(self) -> str:
-        """Name of the engine: its kind in lower case."""
-        return type(self.engine).__name__.lower()
-
-    def settings_of(self, engine: type[EngineT]) -> EngineT:
-        """The settings of the scenario's engine. Raises TypeError if it is of another kind."""
-        if not isinstance(self.engine, engine):
-            raise TypeError(f"the engine is !{type(self.engine).__name__}")
-        return self.engine
-
-    @property
-    def lacking(self) -> tuple[str, ...]:
-        """Properties that some metrics need and this scenario's robot or actuators do not have,
-        such as "row of tetrahedra". Such metrics are NaN."""
-        return *self.robot.lacking, *self.actuation.lacking
-
-    @property
-    def whole_cables(self) -> list[str]:
-        """Names of the cables that no event cuts."""
-        names = self.robot.blueprint().cable_names
-        numbers = cable_numbers(names)
-        cut = {numbers[name] for event in self.events for name in event.cut}
-        return [name for number, name in enumerate(names) if number not in cut]
-
-    @property
     def draw_count(self) -> int:
         """Number of simulations per gait in evolution: one, or one per draw of disturbances."""
         return self.disturbances.draws if self.disturbances else 1
 
     @functools.cached_property
-    def policy_parameters(self) -> Mapping[str, PolicyBounds]:
-        """Names of the parameters of the scenario's policy, with their bounds in random policies;
-        empty without a policy."""
-        return {} if self.policy is None else self.policy.parameters(self.blueprint())
-
-    def blueprint(self) -> Blueprint:
-        """The blueprint of the robot, without contact nodes if there is no ground."""
-        blueprint = self.robot.blueprint()
-        if self.terrain.is_ground:
-            return blueprint
-        return dataclasses.replace(blueprint, contacts=blueprint.contacts[:0])
-
-    @classmethod
-    def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
-        """Makes a scenario from the content of a file that has all settings. Raises InputError that
-        names `source` and key."""
-        return super().from_tree(with_structure(tree, source), source, key=key)
-
-    def with_changes(self, changes: Mapping[str, Any]) -> Self:
-        """A checked copy with other values: {"robot.tetrahedra": 7, "friction": "!Coulomb"}.
-
-        The rules are the same as for a file with this scenario as its base: quantities have units,
-        mappings change the keys that they name, and the spacing is adapted. A kind may be a text as
-        in a file ("friction": "!Coulomb {static: 0.3}"), or a section with SI numbers
-        ({"friction": Coulomb()}); both replace the old one. Raises InputError, naming the key.
-        """
-        source = f"scenario {self.name}"
-        return self.with_file(tree_of_changes(changes, source), source)
-
-    def with_file(self, changes: Tree, source: object) -> Self:
-        """A checked copy with the settings of a scenario file whose `base` is this scenario.
-
-        `changes` is the parsed content of the file, without `base`: nested mappings with the keys
-        that differ, quantities with units. See changes.merged() for the rules. Raises InputError
-        that names `source`, such as the file, and key.
-        """
-        changes = with_structure(changes, source)
-        tree = merged(self.model_dump(), changes, section=self)
-        changed = self.from_tree(tree, source)
-        robot = changes.get("robot")
-        implied = isinstance(robot, dict) and changed.robot.implied_changes(self.robot, robot)
-        return self.from_tree(merged(tree, {"robot": implied}), source) if implied else changed
-
-    def after(self, events: Sequence[Event]) -> Self:
-        """Checked copy with the numbers that `events` change, and without events. Raises InputError
-        for a number that its key does not allow."""
-        alone = self.with_sections(events=[], disturbances=None)
-        changes = {key: number for event in events for key, number in event.change.items()}
-        return alone.with_changes(changes) if changes else alone
-
-    def on_engine(self, name: str | None) -> Self:
-        """This scenario with the engine called `name`, such as "compiled", in its default settings.
-        If the scenario has this engine already, or `name` is None, nothing changes."""
-        if name in (None, self.engine_name):
-            return self
-        return self.with_changes({"engine": {TAG: str(name).capitalize()}})
-
-    def with_sections(self, **sections: Any) -> Self:
-        """A copy with other sections, such as terrain=Flat(). They are not checked."""
-        return self.model_copy(update=sections)
-
-    def with_numbers(self, numbers: Mapping[str, float]) -> Self:
-        """A copy with other numbers in SI units by dotted keys, such as {"ground.stiffness": 5e3}.
-        They are not checked."""
-        changed = self
-        for key, number in numbers.items():
-            changed = _with_number(changed, key.split("."), number)
-        return changed
-
-    def numbers(self) -> dict[str, float]:
-        """SI numbers of the scenario by dotted keys, without `disturbances`, `objective` and
-        `require`."""
-        tree = self.model_dump(exclude={"disturbances", "objective", "require"})
-        return {key: value for key, value in flattened(tree).items() if isinstance(value, float)}
+    def parameters(self) -> Mapping[str, GaitParameter]:
+        """Parameters of a gait by name, with the bounds of `gait_bounds`; see World.parameters."""
+        return self.parameters_within(self.gait_bounds)
 
     _split = model_validator(mode="before")(split_tolerances)
     _check_known = model_validator(mode="after")(check_tolerances)
 
     @model_validator(mode="after")
-    def _check_combinations(self) -> Self:
-        """Raises InputError, naming a key, for settings of different sections that do not go
-        together, such as a sample period too short for the memory."""
-        simulation, step = self.simulation, self.cpg.listing_step
-        if step > simulation.duration:
-            expected = f"expected at most the duration, {simulation.duration} s"
-            refuse("cpg.listing_step", f"found {step} s, {expected}")
-        if "load" in self.cpg.feedback and self.robot.gravity == 0.0:
-            refuse("robot.gravity", "found 0 m/s^2, expected a weight, for feedback of the load")
-
+    def _check_experiment(self) -> Self:
+        """Raises InputError, naming a key, for metrics that the world does not have, and for bounds
+        of gaits that do not go with its robot or policy."""
         measures = getattr(self.optimizer, "measures", {})
         named = {"objective": self.objective, "require": self.require}
         for key, metrics in {**named, "optimizer.measures": measures}.items():
@@ -344,27 +176,9 @@ class Scenario(Section):
                     refuse(f"{key}.{name}", f"!{section.tag} {problem}")
 
         blueprint, bounds = self.robot.blueprint(), self.gait_bounds
-        periods = simulation.control_period / step
-        if self.policy and (periods < 0.5 or abs(periods - round(periods)) > 1e-6):
-            expected = f"expected a multiple of cpg.listing_step, {step} s, for a policy"
-            refuse("simulation.control_period", f"found {simulation.control_period} s, {expected}")
-        excluded = {"cpg.feedback": self.cpg.feedback, "gait_bounds.turn": bounds.turn}
-        for key, value in excluded.items():
-            if self.policy and value:
-                refuse(key, f"found {value}, expected none: a policy excludes it")
-        is_drake = isinstance(self.engine, Drake)
-        most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
-        least_step = simulation.duration * blueprint.signals / most_signals
-        least_sample = simulation.duration * len(blueprint.bodies) / MOST_SAMPLES
-        for key, period, least in (
-            ("cpg.listing_step", step, least_step),
-            ("simulation.sample_period", simulation.sample_period, least_sample),
-            ("engine.step", getattr(self.engine, "step", math.inf), least_step),
-        ):
-            if period < least:
-                problem = f"found {period} s, expected at least {least:.3g} s, to fit in memory"
-                refuse(key, f"{problem}, for this duration and robot")
-
+        if self.policy and bounds.turn:
+            found = f"found {bounds.turn}, expected none"
+            refuse("gait_bounds.turn", f"{found}: a policy excludes it")
         if bounds.turn != 0.0 and not blueprint.sides.any():
             expected = "expected 0, as no group is on one side"
             refuse("gait_bounds.turn", f"found {bounds.turn}, {expected}")
@@ -373,36 +187,6 @@ class Scenario(Section):
             expected = f"expected false, as '{oscillator}' has no mirror image"
             refuse("gait_bounds.mirrored", f"found true, {expected}")
         return self
-
-    @model_validator(mode="after")
-    def _check_events(self) -> Self:
-        """Refuses events after the end, unknown or repeated names, and changes that are no numbers
-        of ground or friction."""
-        if not self.events:
-            return self
-        check_taken(self.events, self.robot.blueprint())
-        changeable = [key for key in self.numbers() if key.startswith(CHANGEABLE)]
-        order = sorted(range(len(self.events)), key=lambda i: self.events[i].at)
-        for i, events in zip(order, up_to_each(self.events), strict=True):
-            place, event = f"events[{i}]", self.events[i]
-            self._check_time(f"{place}.at", event.at)
-            if not (event.cut or event.lose or event.change):
-                refuse(place, "changes nothing, expected cut, lose or change")
-            for key in event.change:
-                if key not in changeable:
-                    found = f"'{key}' is no number of ground or friction"
-                    refuse(f"{place}.change", f"{found}; {hint(key, changeable)}")
-            try:
-                self.after(events)
-            except InputError as error:
-                more = "" if error.key in event.change else "; change it as well"
-                refuse(f"{place}.change.{error.key}", error.problem + more)
-        return self
-
-    def _check_time(self, key: str, time: float) -> None:
-        end = self.simulation.duration
-        if time >= end:
-            refuse(key, f"found {time:g} s, expected less than the duration, {end:g} s")
 
     @model_validator(mode="after")
     def _check_evolve(self) -> Self:
@@ -469,6 +253,13 @@ class Scenario(Section):
         return self
 
 
+def scenario_of(world: World) -> Scenario:
+    """The scenario whose world this is. Raises TypeError for a world without experiment."""
+    if not isinstance(world, Scenario):
+        raise TypeError(f"expected a Scenario, found a {type(world).__name__}")
+    return world
+
+
 @functools.cache
 def _thesis() -> Scenario:
     """The scenario `thesis`, which printed scenarios are compared with."""
@@ -484,14 +275,3 @@ def _text(value: Any, *, exact: bool = False) -> str:
     if exact:
         return text
     return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
-
-
-def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
-    """A copy of a section or mapping with another number at the path `names`: the parts of a dotted
-    key, such as ["ground", "stiffness"]."""
-    if not names:
-        return number
-    name, *rest = names
-    if isinstance(value, Section):
-        return value.model_copy(update={name: _with_number(getattr(value, name), rest, number)})
-    return {**value, name: _with_number(value[name], rest, number)}

@@ -10,21 +10,18 @@ from typing import Any
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.scenario.changes import merged
-from tetra_drake.scenario.mjcf import mjcf_tree
-from tetra_drake.scenario.mjcf_file import is_mjcf
-from tetra_drake.scenario.ntrt import ntrt_tree
-from tetra_drake.scenario.ntrt_file import NtrtFile
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import named_structure, shipped_scenarios, structure_names
 from tetra_drake.scenario.structure_graph import members
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 from tetra_drake.settings.refusals import TAG, described, no_such
 from tetra_drake.settings.section import Tree, keys_of, written
-from tetra_drake.settings.units import given_quantity
 
 _LOG = logging.getLogger("tetra_drake")
 _KIND = StructureFile.tag
 
+_XML = (".xml", ".mjcf")
+"""Suffixes of MuJoCo's files."""
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 """Keys that occur only in files of NTRT."""
 SCENARIO_KEYS = {"base", "robot"}
@@ -33,18 +30,17 @@ any."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
-    """Reads a structure: one of the package or of a plug-in by name, or a structure file, file of
-    NTRT or MJCF file by path.
+    """Reads a structure: one of the package or of a plug-in by name, or a structure file by path.
 
-    `unit`, such as "dm", is the unit of length of coordinates without a unit. A file of NTRT (NASA
-    Tensegrity Robotics Toolkit) needs it. Raises InputError that names file and key.
+    `unit`, such as "dm", is the unit of length of coordinates without a unit. Raises InputError
+    that names file and key.
     """
     file = structure_file(str(name_or_file), Path())
     if not os.path.exists(file):
         problem = no_such("structure file", str(name_or_file), structure_names())
         raise InputError(name_or_file, "", problem)
-    content = _tree_of_file(file, unit, source=file, key="unit")
-    return _structure(content | ({"unit": unit} if unit else {}), file)
+    content = _content(file)
+    return structure_of(content | ({"unit": unit} if unit else {}), file)
 
 
 def save_structure(structure: StructureFile, path: Path, *, source: str) -> None:
@@ -61,11 +57,23 @@ def names_scenario(name_or_file: str | Path) -> bool:
     name = str(name_or_file)
     if name in structure_names() or not os.path.isfile(name):
         return name in shipped_scenarios() and name not in structure_names()
-    if is_mjcf(name):
+    if foreign_format(Path(name)):
         return False
-    keys = [*keys_of(StructureFile), *keys_of(NtrtFile), *SCENARIO_KEYS]
+    keys = [*keys_of(StructureFile), *SCENARIO_KEYS]
     content = read_mapping(Path(name), "structure file", keys=keys)
     return not SCENARIO_KEYS.isdisjoint(content)
+
+
+def foreign_format(name_or_file: str | Path) -> str:
+    """Name of the software whose format a file has, "MuJoCo" or "NTRT"; empty for a structure, a
+    scenario or no file. Raises InputError if the file cannot be read."""
+    file = Path(name_or_file)
+    if file.suffix.lower() in _XML:
+        return "MuJoCo"
+    if str(file) in {*structure_names(), *shipped_scenarios()} or not os.path.isfile(file):
+        return ""
+    keys = [*keys_of(StructureFile), *SCENARIO_KEYS, *KEYS_OF_NTRT]
+    return "NTRT" if KEYS_OF_NTRT & read_mapping(file, "structure file", keys=keys).keys() else ""
 
 
 def structure_file(name: str, folder: Path) -> Path:
@@ -85,24 +93,18 @@ def with_structure(tree: Tree, source: object) -> Tree:
     robot = tree.get("robot")
     if not isinstance(robot, dict) or robot.get(TAG, _KIND) != _KIND or "file" not in robot:
         return tree
-    changes = {key: value for key, value in robot.items() if key not in (TAG, "file", "without")}
+    changes = {key: value for key, value in robot.items() if key not in (TAG, "file")}
     name = robot["file"]
     if not isinstance(name, str) or not os.path.exists(structure_file(name, Path())):
         problem = no_such("structure file", str(name), structure_names())
         raise InputError(source, "robot.file", f"{described(name)}: {problem}")
     file = structure_file(name, Path())
-    if isinstance(without := robot.get("without"), str) and is_mjcf(file):
-        content = mjcf_tree(file, without=[name.strip() for name in without.split(",")])
-    elif without is not None:
-        problem = f"found {described(without)}, expected bodies of a file of MuJoCo, such as a, b"
-        raise InputError(source, "robot.without", problem)
-    else:
-        content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
-    section = _structure(content, file)
+    content = _content(file)
+    section = structure_of(content, file)
     return tree | {"robot": {TAG: _KIND} | merged(content, changes, "robot", section=section)}
 
 
-def _structure(content: Any, file: Path) -> StructureFile:
+def structure_of(content: Any, file: Path) -> StructureFile:
     """Structure from the parsed content of a file. A warning in the log names the nodes that
     nothing uses. Raises InputError that names `file` and key."""
     structure = StructureFile.from_tree(content, file)
@@ -115,17 +117,10 @@ def _structure(content: Any, file: Path) -> StructureFile:
     return structure
 
 
-def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
-    """Content of a structure file, or of a file of NTRT or MuJoCo converted to one. `unit` is the
-    unit of length of a file of NTRT. If it is missing or wrong, InputError names `source` and
-    `key`."""
-    if is_mjcf(file):
-        return mjcf_tree(file)
-    keys = keys_of(StructureFile) | keys_of(NtrtFile)
-    content = read_mapping(file, "structure file", keys=keys)
-    if not KEYS_OF_NTRT & content.keys():
-        return content
-    if unit is None:
-        problem = f"is missing; give the unit of length of '{file}', such as dm"
-        raise InputError(source, key, problem)
-    return ntrt_tree(file, unit=given_quantity(f"1 {unit}", "m", source, key))
+def _content(file: Path) -> Any:
+    """Content of a structure file. Raises InputError for a file of other software."""
+    if software := foreign_format(file):
+        unit = " --unit dm" if software == "NTRT" else ""
+        remedy = f"tetra-drake structure '{file}'{unit} --out structure.yaml"
+        raise InputError(file, "", f"is a file of {software}; convert it once: {remedy}")
+    return read_mapping(file, "structure file", keys=keys_of(StructureFile))

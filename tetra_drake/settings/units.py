@@ -15,7 +15,6 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import listed
 
 INCH = 0.0254  # m, exact
 POUND_FORCE = 4.4482216152605  # N, exact
@@ -82,7 +81,7 @@ def shown_in(name: str | None) -> Iterator[None]:
     """Context manager that shows all numbers in the units called `name`, a key of SYSTEMS. Without
     a name, each scenario keeps its own. Raises InputError for another name."""
     if name and name not in SYSTEMS:
-        raise InputError("units", "", f"found '{name}', expected one of {listed(list(SYSTEMS))}")
+        raise InputError("units", "", f"found '{name}', expected one of {', '.join(SYSTEMS)}")
     token = _chosen.set(SYSTEMS[name] if name else _chosen.get())
     try:
         yield

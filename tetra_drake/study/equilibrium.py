@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas
@@ -24,6 +25,7 @@ from tetra_drake.laws.capsules import NoStrutContact
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.laws.kinematics import FORCE
 from tetra_drake.laws.terrain import Flat, Nothing
+from tetra_drake.on_demand import loaded
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.equilibrium import (
     Unactuated,
@@ -36,14 +38,15 @@ from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.remarks import BEARS, sinking_remark, yielding_remark
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import Structure, node_motions, node_positions
 from tetra_drake.robot.struts import MEETING, condensed, overlaps
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
 from tetra_drake.scenario.structure_files import names_scenario, read_structure
 from tetra_drake.settings.refusals import no_such
-from tetra_drake.study.linearization import DampedModes, linearize, node_motions
 from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
 
 _LARGE = 50
@@ -123,8 +126,10 @@ class EquilibriumStudy:
         return modes / farthest, of_bodies / farthest
 
     @functools.cached_property
-    def damped(self) -> DampedModes:
-        """Modes with damping. Nodes on the ground stick by their friction; see linearize()."""
+    def damped(self) -> Any:
+        """Modes with damping, as DampedModes. Nodes on the ground stick by their friction; see
+        linearize()."""
+        linearize = loaded("tetra_drake.lab.linearization.linearization:linearize")
         return linearize(self.robot, self.robot.equilibrium.state).modes()
 
 
@@ -190,50 +195,56 @@ def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.nda
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     """Robot of a structure file or of a scenario, on flat ground, so that MuJoCo can simulate it:
-    each actuator is an ideal force. A structure gets Coulomb friction.
-
-    A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
-    for it. Without weight it floats, and there is no ground. A file of the NASA Tensegrity Robotics
-    Toolkit (NTRT) has bare numbers, so it needs a `unit` of length, such as "dm". Struts may
-    overlap in the file, as they do in some of NTRT's; in equilibrium they touch. If the axes of two
-    struts meet, as in plane models, all struts pass through each other. Raises InputError that
-    names file and key.
+    each actuator is an ideal force. For a structure see robot_of_structure(); `unit` is the unit of
+    its bare coordinates. Raises InputError that names file and key.
     """
     known = [*dict.fromkeys([*structure_names(), *shipped_scenarios()])]
     if name_or_file not in known and not os.path.exists(name_or_file):
         problem = no_such("structure or scenario", name_or_file, known)
         raise InputError(name_or_file, "", problem)
-    is_scenario = names_scenario(name_or_file)
-    if is_scenario:
-        given = load_scenario(name_or_file)
-        ground = Flat() if given.terrain.is_ground else given.terrain
-        given = given.with_sections(terrain=ground, actuation=Force())
-    else:
-        structure, name = read_structure(name_or_file, unit=unit), Path(name_or_file).stem
-        given = load_scenario(_SURROUNDINGS).with_sections(name=name, robot=structure)
-        if not structure.gravity:  # else rounding decides which nodes touch the ground
-            given = given.with_sections(terrain=Nothing())
-        placed = Structure.of(structure.blueprint())
-        crossing = overlaps(given, placed, placed.initial_state).values()
-        if any(distance <= MEETING for _, distance in crossing):
-            given = given.with_sections(strut_contact=NoStrutContact())
+    if not names_scenario(name_or_file):
+        return robot_of_structure(read_structure(name_or_file, unit=unit), name_or_file)
+    given = load_scenario(name_or_file)
+    ground = Flat() if given.terrain.is_ground else given.terrain
+    given = given.with_sections(terrain=ground, actuation=Force())
+    return _at_rest(given, name_or_file)
+
+
+def robot_of_structure(structure: StructureFile, source: str) -> Robot:
+    """Robot of a structure on flat ground, under Coulomb friction.
+
+    It stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy for it.
+    Without weight it floats, and there is no ground. Struts may overlap in the file, as they do in
+    some of NTRT's; in equilibrium they touch. If the axes of two struts meet, as in plane models,
+    all struts pass through each other. Raises InputError that names `source`, the file, and key.
+    """
+    name = Path(source).stem
+    given = load_scenario(_SURROUNDINGS).with_sections(name=name, robot=structure)
+    if not structure.gravity:  # else rounding decides which nodes touch the ground
+        given = given.with_sections(terrain=Nothing())
+    placed = Structure.of(structure.blueprint())
+    crossing = overlaps(given, placed, placed.initial_state).values()
+    if any(distance <= MEETING for _, distance in crossing):
+        given = given.with_sections(strut_contact=NoStrutContact())
+    robot = _at_rest(given, source, within="robot.")
+    p_WN = node_positions(robot.structure, robot.structure.initial_state)
+    # With this stiffness, a single node bears the weight.
+    least = robot.weight / (BEARS * float(np.ptp(p_WN, axis=0).max()))
+    if least <= given.ground.stiffness:
+        return robot
+    damping = given.ground.damping * least / given.ground.stiffness
+    firm = {"ground.stiffness": least, "ground.damping": damping}
+    return _at_rest(given.with_numbers(firm), source, within="robot.")
+
+
+def _at_rest(given: Scenario, source: str, *, within: str = "") -> Robot:
+    """Robot of a scenario, at its equilibrium, without what MuJoCo lacks. Errors name `source`, and
+    the key `within` a section."""
     friction = given.friction.without_bristles()
-    scenario = given.with_sections(friction=friction, engine=Mujoco())
     try:
-        robot = Robot.of(scenario, at_rest=True)
-        if is_scenario:
-            return robot
-        p_WN = node_positions(robot.structure, robot.structure.initial_state)
-        # With this stiffness, a single node bears the weight.
-        least = robot.weight / (BEARS * float(np.ptp(p_WN, axis=0).max()))
-        if least <= given.ground.stiffness:
-            return robot
-        damping = given.ground.damping * least / given.ground.stiffness
-        firm = scenario.with_numbers({"ground.stiffness": least, "ground.damping": damping})
-        return Robot.of(firm, at_rest=True)
+        return Robot.of(given.with_sections(friction=friction, engine=Mujoco()), at_rest=True)
     except InputError as error:
-        key = error.key if is_scenario else error.key.removeprefix("robot.")
-        raise InputError(name_or_file, key, error.problem) from error
+        raise InputError(source, error.key.removeprefix(within), error.problem) from error
 
 
 def structure_text(study: EquilibriumStudy) -> str:

@@ -35,9 +35,11 @@ from tetra_drake.figures.style import (
 from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
 from tetra_drake.machine import versions
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import AnyGait, GivenGait, given_gait, with_body
-from tetra_drake.scenario.common_sections import Disturbances
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
@@ -186,7 +188,7 @@ def robustness(
             if draw.events:
                 plan.append(({"what": CUTS, "draw": i}, Draw({}, events=draw.events)))
 
-    walks: dict[int, tuple[Scenario, dict[Any, AnyGait]]] = {}
+    walks: dict[int, tuple[Scenario, dict[Any, Gait]]] = {}
     for key, gait in walkers.items():
         own, bare = with_body(scenario, gait)
         walks.setdefault(id(own), (own, {}))[1][key] = bare
@@ -202,7 +204,7 @@ def robustness(
 
 
 def _simulated(
-    scenario: Scenario, plan: Sequence[_Planned], gaits: Mapping[Any, AnyGait], workers: int | None
+    scenario: Scenario, plan: Sequence[_Planned], gaits: Mapping[Any, Gait], workers: int | None
 ) -> list[dict[str, Any]]:
     """Simulates each gait in each draw of disturbances. Returns a row per simulation: the labels of
     the draw, and the columns that all tables of Judgement have.
@@ -214,7 +216,7 @@ def _simulated(
     """
     check_scenario(scenario)
     rows: list[dict[str, Any]] = []
-    walking: list[tuple[dict[str, Any], Scenario, AnyGait]] = []
+    walking: list[tuple[dict[str, Any], Scenario, Gait]] = []
     for labels, draw in plan:
         changed = disturbed(scenario, draw)  # shared by all gaits: the engine prepares it once
         refusal = None

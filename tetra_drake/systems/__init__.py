@@ -6,20 +6,27 @@ network; HeldSignals or SampledController in place of a network. AddCables, AddG
 Attach add them to any plant; diagram.MakeTensegrityDiagram() wires a robot.
 
 Diagrams of these systems convert to AutoDiffXd and can be cloned; see `scalar_conversion`.
+
+Each name is imported at its first use; the names and their modules are in `__init__.pyi`.
 """
 
-# ruff: noqa: I001
-from tetra_drake.systems.steering import Steering as Steering
-from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg as MatsuokaCpg
-from tetra_drake.systems.start_up_gate import StartUpGate as StartUpGate
-from tetra_drake.systems.cable_network import CableNetwork as CableNetwork
-from tetra_drake.systems.ground_contact import GroundContact as GroundContact
-from tetra_drake.systems.state_forces import StateForces as StateForces
-from tetra_drake.systems.feedback import Feedback as Feedback
-from tetra_drake.systems.sampled_controller import HeldSignals as HeldSignals
-from tetra_drake.systems.sampled_controller import SampledController as SampledController
-from tetra_drake.systems.cable_network import Cable as Cable
-from tetra_drake.systems.cable_network import AddCables as AddCables
-from tetra_drake.systems.ground_contact import AddGroundContact as AddGroundContact
-from tetra_drake.systems.attachment import Attach as Attach
-from tetra_drake.robot.structure import AddFrame as AddFrame
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tetra_drake.on_demand import loaded, places
+
+_PLACES = places(Path(__file__))
+
+__all__ = [*_PLACES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'tetra_drake.systems' has no attribute '{name}'")
+    return loaded(_PLACES[name])
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

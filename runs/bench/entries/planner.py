@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.engines.planner import Cost, Planner
+from tetra_drake.lab.planner import Cost, Planner
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 

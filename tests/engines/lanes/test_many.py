@@ -29,11 +29,11 @@ from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
-from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -196,9 +196,9 @@ def test_scenarios_and_gaits_have_to_fit(short):
         simulate_many(scenario=[short, short], gaits=[gait] * 3)
     with pytest.raises(InputError) as caught:
         simulate_many(scenario=short.with_changes({"robot.tetrahedra": 3}), gaits=[gait])
-    assert caught.value.key == "weights"
+    assert caught.value.key == "parameters"
     with SimulationQueue(1) as queue:  # a gait that is refused leaves the lanes as they are
-        fit, misfit = (short, gait), (short, dataclasses.replace(gait, weights=(1.0,) * 4))
+        fit, misfit = (short, gait), (short, dataclasses.replace(gait, parameters={"tau_A": 1.0}))
         futures = queue.submit([fit, misfit, fit, misfit, misfit, fit])
         assert [future.exception() is None for future in futures] == [1, 0, 1, 0, 0, 1]
     assert simulate_many(scenario=short, gaits=[]) == []

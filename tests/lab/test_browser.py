@@ -1,0 +1,179 @@
+"""The pages in a real browser, headless and without network."""
+
+import base64
+import contextlib
+import io
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import quick_figures
+from helpers.synthetic_run import write_run
+from matplotlib.colors import hex2color, rgb_to_hsv
+from matplotlib.image import imread
+
+from tests.visualization.conftest import WINDOW, opened
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.lab.films.browser import do, wait_until_loaded
+from tetra_drake.lab.films.video import make_video
+from tetra_drake.report.run_page import write_report
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.settings.units import INCH
+from tetra_drake.visualization.replay import save_replay
+from tetra_drake.visualization.scene import COLOURS
+
+pytestmark = pytest.mark.slow
+
+ROBOT = Robot.of(load_scenario("thesis"))
+GALLERY = Path(__file__).parents[2] / "runs/index.html"
+
+
+@pytest.fixture(scope="module")
+def trajectory(data):
+    """5 s, long enough to get somewhere."""
+    changes = {"simulation.duration": "5.0 s", "engine": "!Compiled"}
+    scenario = load_scenario("thesis").with_changes(changes)
+    gait = load_gait(data / "gait_g.json", scenario)
+    return simulate(scenario=scenario, gait=gait, record=True).trajectory
+
+
+@pytest.fixture(scope="module")
+def replay(trajectory, tmp_path_factory):
+    path = tmp_path_factory.mktemp("replay") / "replay.html"
+    save_replay(path, robot=ROBOT, trajectory=trajectory, title="a gait: walks 1.0 in")
+    return path
+
+
+@pytest.fixture(scope="module")
+def page(browser, replay):
+    """The replay page once it plays by itself; tests may stop and resize it."""
+    with opened(browser, replay.as_uri()) as loaded:
+        loaded.wait_for_function("parseFloat(document.getElementById('clock').value) > 0.1")
+        do(loaded, "pause")
+        yield loaded
+
+
+PROJECT = """points => {
+    viewer.render();
+    // Meshcat's scene has its y axis up, so World is turned in it.
+    const world = viewer.scene_tree.object.matrixWorld;
+    return points.map(point => new MeshCat.THREE.Vector3(...point)
+        .applyMatrix4(world).project(viewer.camera).toArray());
+}"""
+
+
+def extent(page, trajectory, time):
+    """Share of the picture's half width or height that the robot reaches."""
+    points = trajectory["p_WN"].sel(time=time).values
+    return np.abs(np.array(page.evaluate(PROJECT, points.tolist()))[:, :2]).max()
+
+
+def test_cables_and_feet_on_the_ground_are_seen(page):
+    do(page, "show", 2.0)
+    url = page.evaluate("viewer.capture_image(600, 400)")  # without the texts over it
+    png = base64.b64decode(url.removeprefix("data:image/png;base64,"))
+    image = imread(io.BytesIO(png), format="png")[..., :3]
+    hue, saturation, _ = np.moveaxis(rgb_to_hsv(image), -1, 0)
+    for name in ("actuated", "passive", "stance"):
+        wanted, wanted_saturation, _ = rgb_to_hsv(hex2color(COLOURS[name]))
+        apart = np.abs((hue - wanted + 0.5) % 1.0 - 0.5)
+        assert ((apart < 0.02) & (saturation > 0.7 * wanted_saturation)).sum() > 20
+
+
+def test_the_camera_follows_and_keeps_the_robot_large(page, trajectory):
+    for width, height in ((300, 500), WINDOW):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_function(f"viewer.renderer.domElement.width == {width}")
+        for time in (0.0, 5.0):
+            do(page, "show", time)
+            assert 0.5 < extent(page, trajectory, time) < 0.85, f"in a width of {width}"
+
+
+def text(page, output):
+    """What an output of the page says."""
+    return page.evaluate("id => document.getElementById(id).value", output)
+
+
+def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
+    do(page, "show", 5.0)
+    x = trajectory["p_WN"].values[:, 0, 0] / INCH
+    assert text(page, "clock") == "5.0 / 5.0 s"
+    assert text(page, "reached") == f"walked {x[-1] - x[0]:.1f} in"
+    page.locator("#time").fill("2")
+    assert text(page, "clock") == "2.0 / 5.0 s"
+    page.locator("#play").click()
+    page.wait_for_function("parseFloat(document.getElementById('clock').value) > 2.1")
+    page.locator("#play").click()
+    # Keys do the same.
+    do(page, "show", 2.0)
+    page.evaluate("document.activeElement.blur()")
+    for key, time in (("ArrowRight", "2.1"), ("Shift+ArrowRight", "3.1"), ("ArrowLeft", "3.0")):
+        page.keyboard.press(key)
+        assert text(page, "clock") == f"{time} / 5.0 s"
+    page.locator("#time").focus()  # where the browser has its own use of keys
+    for pressed in ("true", "false"):
+        page.keyboard.press("Space")
+        assert page.locator("#play").get_attribute("aria-pressed") == pressed
+
+
+def test_on_a_phone_nothing_lies_over_the_robot(browser, replay):
+    box = "id => document.getElementById(id).getBoundingClientRect().toJSON()"
+    with opened(browser, replay.as_uri(), size=(400, 700)) as page:
+        wait_until_loaded(page)
+        for legend_is_open in (False, True):
+            page.evaluate(f"document.getElementById('legend').open = {str(legend_is_open).lower()}")
+            page.wait_for_timeout(200)
+            pane = page.evaluate(box, "meshcat-pane")
+            assert pane["height"] > 250
+            assert page.evaluate(box, "heading")["bottom"] <= pane["top"] + 1
+            for below in ("bar", "legend"):
+                assert page.evaluate(box, below)["top"] >= pane["bottom"] - 1
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+
+@pytest.mark.parametrize(("name", "view"), [("talk.mp4", "side"), ("talk.gif", "top")])
+def test_a_video_has_its_size_rate_and_speed(browser, replay, tmp_path, name, view):
+    """The motion of 5 s takes 0.5 s at ten times its speed. The page's texts would fill it."""
+    reader = pytest.importorskip("imageio_ffmpeg").read_frames
+    settings = {"size": (320, 180), "fps": 10.0, "view": view, "speed": 10.0}
+    with ThreadPoolExecutor(1) as pool:  # this thread may have the browser of other tests
+        pool.submit(make_video, replay.read_text(), tmp_path / name, **settings).result()
+    about, *frames = reader(str(tmp_path / name))
+    assert about["size"] == (320, 180) and about["fps"] == pytest.approx(10.0)
+    assert len(frames) == 5 and frames[0] != frames[-1]
+
+
+@pytest.mark.skipif(not GALLERY.exists(), reason="as in a source distribution")
+def test_the_gallery_opens_replays(browser):
+    with opened(browser, GALLERY.as_uri()) as page:
+        page.locator("a[href='champion/replay.html']").click()
+        wait_until_loaded(page)
+
+
+def test_a_page_without_its_viewer_says_how_to_get_it(browser, trajectory, tmp_path):
+    path, viewer = tmp_path / "replay.html", tmp_path / "meshcat.js"
+    save_replay(path, robot=ROBOT, trajectory=trajectory, title="a: b", viewer=viewer)
+    viewer.unlink()
+    with contextlib.closing(browser.new_page()) as page:
+        page.goto(path.as_uri())
+        page.wait_for_function("document.body.innerText.includes('tetra-drake replay')")
+        assert "meshcat.js" in page.locator("body").inner_text()
+
+
+def test_a_report_shows_its_figures_and_leads_to_the_replay(browser, tmp_path, monkeypatch):
+    monkeypatch.setattr("tetra_drake.report.run_page.save_figure", quick_figures.save_figure)
+    run = write_run(tmp_path / "run", [[[(1.0, 0), (2.0, 1)]]])
+    _, replay, report = write_report(run)
+    with opened(browser, report.as_uri()) as page:
+        page.wait_for_load_state("networkidle")
+        assert page.evaluate("[...document.images].every(image => image.naturalWidth > 100)")
+        page.evaluate("document.querySelector('iframe').remove()")  # it draws at every width
+        for width in (400, 1280):
+            page.set_viewport_size({"width": width, "height": 800})
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.locator(f"a[href='{replay.name}']").first.click()
+        wait_until_loaded(page)
+        assert page.evaluate("film.duration") == pytest.approx(0.3)

@@ -1,0 +1,149 @@
+"""A gait as a folder for a prototype: what is in it, and that a robot walks by it."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+from helpers.actuations import ACTUATIONS, FORCE, MOTOR
+
+from tetra_drake.cli import main
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import InputError
+from tetra_drake.lab.prototype.export import COMMAND, EXPECTED, LIMITS_FILE, README, export
+from tetra_drake.laws.actuator import LimitedActuator, Winch
+from tetra_drake.robot.command_file import load_command
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import SCENARIO, load_scenario
+
+RECORDED = Path(__file__).parents[2] / "runs/coulomb/trial_08/best_gait.json"
+
+SHORT = {"simulation.duration": "3 s", "simulation.steady_from": "1 s", "cpg.start_up": "0.2 s"}
+BRIEF = {"simulation.duration": "0.6 s", "simulation.steady_from": "0.3 s"}
+
+
+@pytest.fixture(scope="module")
+def short():
+    return load_scenario("coulomb").with_changes(SHORT)
+
+
+@pytest.mark.skipif(not RECORDED.exists(), reason="the recorded runs are not here")
+@pytest.mark.parametrize("actuation", [FORCE, MOTOR])
+def test_a_robot_walks_by_the_file_as_far_as_by_the_gait(actuation, tmp_path):
+    scenario = load_scenario("coulomb").with_changes(actuation | {"simulation.duration": "6 s"})
+    verdict = export(scenario, load_gait(RECORDED, scenario), rate=100.0, out=tmp_path / "lab")
+    played, own = map(float, re.findall(r"goes (\S+) in", verdict))
+    assert own > 10.0
+    assert played == pytest.approx(own, rel=0.02)
+
+
+def test_the_folder_loads_and_begins_where_the_robot_does(short, tmp_path):
+    folder = tmp_path / "lab"
+    export(short, seeded_gait(short), rate=50.0, out=folder)
+    assert {p.name for p in folder.iterdir()} == {COMMAND, EXPECTED, LIMITS_FILE, SCENARIO, README}
+    assert load_command(folder / COMMAND, load_scenario(folder / SCENARIO)).period == 0.02
+    expected = pandas.read_csv(folder / EXPECTED)
+    assert len(expected) == 3 * 50 + 1
+    # T1's base edge of 6 in lies along y.
+    edge = expected["T1 bottom_left y_mm"] - expected["T1 bottom_right y_mm"]
+    assert edge[0] == pytest.approx(6 * 25.4, abs=1e-5)
+
+
+def test_forces_are_the_signals_of_the_gait(short, tmp_path):
+    gait = seeded_gait(short)
+    export(short, gait, rate=100.0, out=tmp_path / "lab")
+    samples = load_command(tmp_path / "lab" / COMMAND, short).samples
+    signals = simulate(scenario=short, gait=gait, record=True).trajectory.signal
+    of_cable = Robot.of(short).structure.cables["signal"][Robot.of(short).driven]
+    np.testing.assert_allclose(samples, signals.values[:, of_cable], atol=1e-6)
+    assert not samples[:20].any() and samples[21:].any(), "start-up until 0.2 s"
+    limits = pandas.read_csv(tmp_path / "lab" / LIMITS_FILE)
+    assert limits[["limit_of_force_N", "time_at_a_limit_percent"]].isna().all(axis=None)
+
+
+def test_a_tension_motor_is_commanded_the_whole_law_of_the_cable(short, tmp_path):
+    driven = short.with_changes(MOTOR)
+    export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
+    samples = load_command(tmp_path / "lab" / COMMAND, driven).samples
+    # At the start the law is that of the spring, with which the motor begins.
+    np.testing.assert_allclose(samples[0], Robot.of(driven).starting_drives(), atol=1e-6)
+    assert samples.min() >= 0.0 and samples.max() <= 10.0
+
+
+@pytest.mark.parametrize("kind", ACTUATIONS.values(), ids=ACTUATIONS)
+def test_the_loads_are_those_of_the_metrics_and_of_what_is_wound(short, kind, tmp_path):
+    often = {"simulation.sample_period": "1 ms"}
+    driven = short.with_changes({"actuation": kind} | often)
+    export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
+    result = simulate(scenario=driven, gait=seeded_gait(short), record=True)
+    metrics, loads = result.metrics, pandas.read_csv(tmp_path / "lab" / LIMITS_FILE)
+    peaks = loads.max(numeric_only=True)
+    assert peaks["peak_force_N"] == pytest.approx(metrics.peak_actuator_force, rel=1e-5)
+    assert peaks["peak_speed_mm_per_s"] == pytest.approx(
+        1e3 * metrics.peak_actuator_speed, rel=1e-5
+    )
+    assert peaks["peak_power_W"] == pytest.approx(metrics.peak_actuator_power, rel=1e-5)
+    assert loads["mean_power_W"].mean() == pytest.approx(metrics.mean_actuator_power, rel=0.05)
+    if isinstance(kind, LimitedActuator):
+        # Half the greatest force at half the greatest speed: 5 N times 0.25 m/s.
+        assert loads["limit_of_power_W"].max() == 1.25
+    if not kind.lacking:
+        limited = 100.0 * metrics.actuator_limited
+        assert loads["time_at_a_limit_percent"].mean() == pytest.approx(limited, rel=0.05)
+    what = "free_length" if isinstance(kind, Winch) else "length"
+    wound = 1e3 * result.trajectory[what].isel(cable=result.robot.driven)
+    assert loads["cable"].tolist() == wound.cable.values.tolist()
+    np.testing.assert_allclose(loads["least_length_mm"], wound.min("time"), rtol=1e-5)
+    np.testing.assert_allclose(loads["travel_mm"], np.ptp(wound.values, axis=0), rtol=1e-4)
+    assert loads["travel_mm"].min() > 1.0
+
+
+def test_a_weak_motor_is_told_to_be_too_weak(short, tmp_path):
+    first = "a limit binds first at 0.000 s (T1-T2 outer bottom_left)"
+    for force, verdict in (("10 N", "can play it"), ("2 N", f"cannot play all of it: {first}")):
+        motor = short.with_changes(MOTOR).with_changes({"actuation.max_force": force})
+        assert verdict in export(motor, seeded_gait(short), rate=100.0, out=tmp_path / force)
+
+
+def test_a_gait_with_feedback_is_exported_as_it_walked_once(tmp_path):
+    scenario = load_scenario("feedback").with_changes(SHORT | {"engine": "!Compiled"})
+    export(scenario, seeded_gait(scenario), rate=100.0, out=tmp_path / "lab")
+    command = load_command(tmp_path / "lab" / COMMAND, scenario)
+    played = simulate(scenario=scenario, command=command, record=True).trajectory
+    walked = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
+    assert np.abs(played.p_WN.values - walked.p_WN.values).max() < 2e-3
+
+
+def test_what_cannot_be_exported_leaves_nothing(short, tmp_path, refused):
+    for rate in (0.0, 2001.0, 7.1, float("nan")):
+        with refused("export", "rate", "Hz"):
+            export(short, seeded_gait(short), rate=rate, out=tmp_path / "lab")
+    with refused(tmp_path, "", "exists"):
+        export(short, seeded_gait(short), rate=100.0, out=tmp_path)
+    smaller = short.with_changes({"robot.tetrahedra": 3})
+    with pytest.raises(InputError):
+        export(smaller, seeded_gait(short), rate=100.0, out=tmp_path / "new" / "lab")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_command_is_played_on_the_scenario_beside_it(short, tmp_path, monkeypatch, capsys):
+    def played(out, *options):
+        """The scenario on which it was played."""
+        assert main(["simulate", "--command", "lab/command.csv", "--out", out, *options]) == 0
+        return load_scenario(tmp_path / out / SCENARIO)
+
+    monkeypatch.chdir(tmp_path)
+    brief = short.with_changes(BRIEF)
+    export(brief, seeded_gait(brief), rate=50.0, out="lab")
+    beside = load_scenario("lab/scenario.yaml")
+    assert played("beside") == beside
+    assert capsys.readouterr().err == ""
+    Path("other.yaml").write_text("base: lab/scenario.yaml\nname: other\n")
+    assert played("given", "--scenario", "other.yaml").name == "other"
+    (line,) = capsys.readouterr().err.splitlines()
+    assert all(word in line for word in ("lab/command.csv", "other", "lab/scenario.yaml"))
+    Path("lab/scenario.yaml").unlink()
+    assert played("alone", "--engine", "compiled").name == "thesis"

@@ -1,0 +1,395 @@
+"""Small motions about rest against analysis, statics and the engines; LQR."""
+
+import dataclasses
+import functools
+import json
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.anchored import BAR, HUNG, LINE, floating_prism, scenario_of, supported_prism
+from helpers.converged import CONVERGED
+from helpers.meshcat_page import read_page
+from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
+from pydrake.planning import DirectCollocation
+from pydrake.systems.primitives import Linearize, LinearSystem
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.engines.simulation import Simulation
+from tetra_drake.errors import InputError
+from tetra_drake.lab.linearization.linearization import Linearization, linearize
+from tetra_drake.lab.linearization.rates import rates_and_forces
+from tetra_drake.laws.contact import MODE_COLUMNS
+from tetra_drake.robot.parameter_space import seeded_gait
+from tetra_drake.robot.readings import first_readings
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.study.equilibrium import save_structure_page, study_equilibrium
+from tetra_drake.systems import SampledController
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+ROPE = {"stiffness": 35.0, "damping": 1.0, "tension": 4.0}
+MAST = {
+    "nodes": {
+        "foot": [0.0, 0.0, 0.0],
+        "top": [0.0, 0.0, 1.0],
+        **{name: [0.5 * c, 0.5 * s, 0.0] for name, c, s in (("e", 1, 0), ("w", -1, 0))},
+        **{name: [0.5 * c, 0.5 * s, 0.0] for name, c, s in (("n", 0, 1), ("s", 0, -1))},
+    },
+    "struts": {"mast": BAR | {"pairs": [["foot", "top"]]}},
+    "masses": {"top": 0.5},
+    "anchors": dict.fromkeys(["foot", "e", "w", "n", "s"], "xyz"),
+    "cables": {"guy": ROPE | {"pairs": [["top", name] for name in "ewns"]}},
+    "actuated": {name: [f"guy {name} top"] for name in "ewns"},
+}
+"""A mast on a ball joint, with a mass on its top and four soft guys: a push topples it."""
+
+
+@functools.cache
+def undamped() -> Linearization:
+    """The prism without weight, damping and actuators."""
+    groups = "bottom", "top", "side"
+    still = {f"robot__cables__{group}__damping": "0 N*s/m" for group in groups}
+    return linearize(Robot.of(floating_prism(robot__actuated={}, **still)))
+
+
+def test_without_damping_the_oscillations_are_those_of_stiffness_and_mass():
+    linear = undamped()
+    modes, study = linear.modes(), study_equilibrium(linear.robot)
+    assert len(study.frequencies) == 9, "18 motions less 6 of the whole and 3 spins of the bars"
+    assert modes.frequencies == pytest.approx(study.frequencies, rel=1e-7)
+    assert modes.damping_ratios == pytest.approx(np.zeros(9), abs=1e-7)
+    alone = np.flatnonzero(np.diff(study.frequencies, prepend=0, append=1e3)[:-1] > 0.1)[-1]
+    assert abs(np.vdot(modes.shapes[alone], study.modes[alone])) == pytest.approx(
+        np.linalg.norm(study.modes[alone]) ** 2, rel=1e-5
+    )
+
+
+def test_a_weight_on_a_damped_cable_bounces_as_a_damped_oscillator():
+    tree = HUNG | {"cables": {"line": LINE | {"damping": 4.0}}}
+    linear = linearize(Robot.of(scenario_of(tree)))
+    mass, modes = linear.robot.structure.mass.sum(), linear.modes()
+    natural, ratio = math.sqrt(200.0 / mass), 4.0 / (2.0 * math.sqrt(200.0 * mass))
+    bounces = np.abs(modes.shapes[:, 1, 2]).argmax()  # node a goes up and down
+    damped = natural * math.sqrt(1.0 - ratio**2) / (2.0 * math.pi)
+    assert modes.frequencies[bounces] == pytest.approx(damped, rel=1e-6)
+    assert modes.damping_ratios[bounces] == pytest.approx(ratio, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "speed"),
+    [
+        (supported_prism(), 0.01),
+        (load_scenario("prism"), 2e-4),  # the loaded nodes stick, and touch the ground all the time
+    ],
+    ids=["on supports", "on the ground"],
+)
+def test_a_small_push_moves_the_robot_as_the_linear_system(scenario, speed):
+    # The displacements stay below a thousandth of the size.
+    scenario = scenario.with_sections(engine=CONVERGED["compiled"])
+    linear = linearize(scenario)
+    robots = Simulation(scenario, control_period=0.005)
+    rest = robots.step(robots.rest).rows(0)
+    spin = np.array([3.0, -2.0, 1.0])
+    moving = slice(0, robots.robot.structure.first_node[-1])
+    pushed, body_of = rest.copied(), robots.robot.structure.carriers[moving]
+    pushed.w_WB[0] += speed * spin
+    centre = robots.robot.structure.p_WB[0]
+    of_nodes = speed * (np.cross(spin, rest.p_WN[moving] - centre) + np.array([1.0, 0.5, 0.2]))
+    pushed.v_WN[moving] += np.where(body_of[:, np.newaxis] == 0, of_nodes, 0.0)
+    start = linear.deviation(pushed)
+    robots.assume(pushed)
+    farthest = 0.0
+    for step in range(1, 31):
+        found = robots.step(robots.rest).rows(0)
+        x = expm(0.005 * step * linear.system.A()) @ start
+        expected = linear.system.C() @ x
+        seen = "p_WN", "lengths", "tensions"
+        moved = [getattr(found, key) - getattr(rest, key) for key in seen]
+        sizes = np.cumsum([each.size for each in moved])[:-1]
+        for ours, theirs in zip(moved, np.split(expected, sizes), strict=True):
+            assert ours.ravel() == pytest.approx(theirs, abs=0.02 * np.abs(theirs).max() + 1e-7)
+        farthest = max(farthest, np.abs(moved[0]).max())
+        assert linear.deviation(found) == pytest.approx(x, abs=0.03 * np.abs(x).max())
+    assert 1e-6 < farthest < 2e-4
+
+
+def test_the_rates_are_those_of_the_diagram():
+    scenario = load_scenario("winch")
+    robot, gait = Robot.of(scenario), seeded_gait(scenario)
+    diagram, bodies = MakeTensegrityDiagram(robot, gait), len(robot.structure.bodies)
+    context, plant = diagram.CreateDefaultContext(), diagram.GetSubsystemByName("plant")
+    state = robot.structure.initial_state
+    state[7 * bodies :] = 0.01 * np.cos(np.arange(6 * bodies))
+    plant.SetPositionsAndVelocities(plant.GetMyContextFromRoot(context), state)
+    rates = diagram.EvalTimeDerivatives(context).CopyToVector()
+    given = state, robot.starting_modes, robot.first_signals, robot.starting_drives()
+    found = rates_and_forces(robot.model, *given)
+    expected = rates[7 * bodies : 13 * bodies], rates[13 * bodies :]
+    for ours, theirs in zip(found[:2], expected, strict=True):
+        assert ours == pytest.approx(theirs, rel=1e-9, abs=1e-9 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize("actuation", ["!Force", "!Winch {max_force: 200 N, max_speed: 2 m/s}"])
+def test_drake_finds_the_same_matrices_in_its_coordinates(actuation):
+    # Small changes of Drake's states are T x, with N(q) for the displacements in T. So its
+    # derivatives are those of T x' = T A x + T B u.
+    linear = linearize(supported_prism(actuation=actuation))
+    diagram = MakeTensegrityDiagram(linear.robot)
+    context, plant = diagram.CreateDefaultContext(), diagram.GetSubsystemByName("plant")
+    converted, (rates, inputs) = diagram.ToAutoDiffXd(), linear.system.B().shape
+    given = converted.CreateDefaultContext()
+    given.SetTimeStateAndParametersFrom(context)
+    state = context.get_continuous_state_vector().CopyToVector()
+    numbers = InitializeAutoDiff(np.concatenate([state, linear.signals])).ravel()
+    given.SetContinuousState(numbers[: state.size])
+    converted.get_input_port().FixValue(given, numbers[state.size :])
+    theirs = ExtractGradient(converted.EvalTimeDerivatives(given).CopyToVector())
+    own, count = plant.GetMyContextFromRoot(context), plant.num_velocities()
+    to_drake = np.zeros((state.size, rates))
+    for column, unit in enumerate(np.eye(count)):
+        to_drake[: plant.num_positions(), column] = plant.MapVelocityToQDot(own, unit)
+    to_drake[plant.num_positions() :, count:] = np.eye(rates - count)
+    found = to_drake @ np.hstack([linear.system.A(), linear.system.B()])
+    expected = np.hstack([theirs[:, : state.size] @ to_drake, theirs[:, state.size :]])
+    scale = np.abs(found[:, :rates]).max(), np.abs(found[:, rates:]).max()
+    assert found[:, :rates] == pytest.approx(expected[:, :rates], abs=1e-7 * scale[0])
+    assert inputs == 3
+    assert found[:, rates:] == pytest.approx(expected[:, rates:], abs=3e-6 * scale[1])
+
+
+def test_drakes_own_tools_take_a_robot_whose_contacts_keep_their_modes():
+    linear = linearize("prism")
+    diagram = MakeTensegrityDiagram(linear.robot, modes=linear.robot.starting_modes)
+    context, signals = diagram.CreateDefaultContext(), diagram.GetInputPort("signals")
+    signals.FixValue(context, np.zeros(len(linear.inputs)))
+    ports = signals.get_index(), diagram.GetOutputPort("lengths").get_index()
+    roots = np.linalg.eigvals(Linearize(diagram, context, *ports, 1e-3).A())
+    swings = np.sort(roots.imag[roots.imag > 1.0]) / math.tau
+    np.testing.assert_allclose(swings, linear.modes().frequencies, rtol=1e-6)
+    plan = DirectCollocation(diagram, context, 3, 0.01, 0.05, signals.get_index())
+    assert len(plan.state(0)) == linear.state.size
+    assert not diagram.CreateDefaultContext().num_discrete_state_groups()
+    for wrong in ([1.0], np.full((len(linear.robot.structure.contacts), MODE_COLUMNS), np.nan)):
+        with pytest.raises(InputError) as caught:
+            MakeTensegrityDiagram(linear.robot, modes=wrong)
+        assert caught.value.key == "modes"
+
+
+def test_a_winch_follows_its_command_with_its_lag():
+    scenario = supported_prism(actuation="!Winch {max_force: 200 N, max_speed: 2 m/s}")
+    linear = linearize(scenario)
+    assert {*linear.states[-3:]} == {f"drive {name}" for name in linear.inputs}
+    order = [linear.inputs.index(name.removeprefix("drive ")) for name in linear.states[-3:]]
+    lag, stiffness = scenario.actuation.time_constant, 100.0
+    expected = np.hstack([np.zeros((3, 36)), -np.eye(3) / lag])
+    assert linear.system.A()[-3:] == pytest.approx(expected, abs=1e-6)
+    # The command is l0 - S / k.
+    assert linear.system.B()[-3:] == pytest.approx(-np.eye(3)[order] / (stiffness * lag), rel=1e-7)
+
+
+def test_states_inputs_and_outputs_have_names_and_drake_takes_the_system():
+    linear = linearize("prism", outputs=["normal_forces", "v_WN"])
+    assert isinstance(linear.system, LinearSystem)
+    assert linear.states[:6] == (
+        *("n0 n4 theta_x", "n0 n4 theta_y", "n0 n4 theta_z"),
+        *("n0 n4 x", "n0 n4 y", "n0 n4 z"),
+    )
+    assert linear.states[18] == "n0 n4 w_x" and linear.inputs[0] == "side n0 n3"
+    assert {*linear.outputs[:6]} == {f"load n{i}" for i in range(6)}
+    at = linear.outputs.index("n4 v_z"), linear.states.index("n0 n4 v_z")
+    assert linear.system.C()[at] == pytest.approx(1.0)
+    diagram_port = linear.system.get_input_port().size(), linear.system.get_output_port().size()
+    assert diagram_port == (6, 6 + 18)
+
+
+def test_readings_become_states_and_rest_is_their_origin():
+    linear = linearize("prism")
+    assert linear.deviation(first_readings(linear.robot)) == pytest.approx(np.zeros(36), abs=1e-12)
+    p_WB = linear.robot.structure.p_WB.copy()
+    p_WB[:, 2] += 1e-3
+    raised = dataclasses.replace(linear.robot.structure, p_WB=p_WB)
+    moved = first_readings(dataclasses.replace(linear.robot, structure=raised))
+    names = np.array(linear.states)[np.abs(linear.deviation(moved)) > 1e-9]
+    assert names.tolist() == ["n0 n4 z", "n1 n5 z", "n2 n3 z"]
+
+
+def test_a_regulator_holds_a_mast_that_topples_without_it_and_does_so_on_the_diagram():
+    scenario = scenario_of(MAST, 2.0)
+    linear = linearize(scenario)
+    cost = np.diag([float(name.endswith(("theta_x", "theta_y"))) for name in linear.states])
+    gain = linear.lqr(cost, 1e-3 * np.eye(4))
+    closed = np.linalg.eigvals(linear.system.A() - linear.system.B() @ gain)
+    assert closed[np.abs(closed) > 0.3].real.max() < -1.0
+    hold, top = linear.controller(gain), linear.robot.structure.node_names.index("top")
+    push = np.array([2.0, 1.4, 0.0])  # rad/s
+
+    def way(control: bool) -> np.ndarray:
+        robots = Simulation(scenario, control_period=0.02)
+        rest = robots.step(robots.rest).rows(0)
+        moving = rest.p_WN[: robots.robot.structure.first_node[-1]]
+        rest.w_WB[:], rest.v_WN[: len(moving)] = push, np.cross(push, moving)
+        robots.assume(rest)
+        tops = []
+        while not robots.ended[0]:
+            readings = robots.state.rows(0)
+            tops.append(readings.p_WN[top].copy())
+            robots.step(hold(0.0, readings) if control else robots.rest)
+        return np.array(tops)
+
+    held, fallen = way(True), way(False)
+    assert np.abs(held[:, :2]).max() > 0.1 and held[-1, 2] > 0.99
+    assert fallen[:, 2].min() < 0.0
+    law = SampledController(linear.robot, hold, period=0.02)
+    diagram = MakeTensegrityDiagram(linear.robot, controller=law)
+    simulator = MakeSimulator(diagram, linear.robot, Drake(accuracy=1e-6))
+    plant, context = diagram.GetSubsystemByName("plant"), simulator.get_mutable_context()
+    of_middle = np.cross(push, linear.robot.structure.p_WB[0])
+    own = plant.GetMyContextFromRoot(context)
+    plant.SetVelocities(own, np.concatenate([push, of_middle]))
+    simulator.AdvanceTo(0.4)
+    state = diagram.GetOutputPort("state").Eval(simulator.get_context())
+    p_WN = node_positions(linear.robot.structure, state)
+    assert p_WN[top] == pytest.approx(held[20], abs=1e-3)
+
+
+def test_a_regulator_damps_a_floating_robot_and_lets_it_drift():
+    linear = linearize(floating_prism())
+    gain = linear.lqr(np.diag(np.repeat([1.0, 0.01], 18)), 1e-4 * np.eye(6))
+    alone, together = (
+        np.linalg.eigvals(matrix)
+        for matrix in (linear.system.A(), linear.system.A() - linear.system.B() @ gain)
+    )
+    assert np.count_nonzero(np.abs(together) < 0.3) == 18, "twice 6 motions and 3 spins"
+    slowest = [roots[np.abs(roots) > 0.3].real.max() for roots in (alone, together)]
+    assert slowest[1] < 2.0 * slowest[0] < 0.0
+    drift = np.tile(np.concatenate([np.zeros(3), [1.0, 0.0, 0.0]]), 3)
+    assert gain @ np.concatenate([drift, 0.0 * drift]) == pytest.approx(np.zeros(6), abs=1e-4)
+
+
+def test_a_regulator_damps_the_slow_swing_of_a_load_on_a_long_rope():
+    # m x'' = -s x + f with the costs 1 of x and its rate, and r of f. Riccati's equation gives the
+    # gains k = sqrt(s² + 1 / r) - s and c = sqrt(2 m k + 1 / r).
+    long, mass, cost = 150.0, 500.0, 1e-4
+    rope = {"stiffness": 1e5, "damping": 100.0, "tension": mass * 9.80665}
+    guy = {"stiffness": 1.0, "damping": 0.0, "tension": 1.0}
+    tree: dict[str, Any] = {
+        "nodes": {"hook": [0, 0, long], "load": [0, 0, 0], "x": [60, 0, 0], "y": [0, 60, 0]},
+        "masses": {"load": mass},
+        "cables": {
+            "rope": rope | {"pairs": [["hook", "load"]]},
+            "guy": guy | {"pairs": [["load", "x"], ["load", "y"]]},
+        },
+        "anchors": dict.fromkeys(["hook", "x", "y"], "xyz"),
+        "actuated": {"x": ["guy load x"], "y": ["guy load y"]},
+    }
+    linear = linearize(scenario_of(tree))
+    gain = linear.lqr(np.eye(12), cost * np.eye(2))
+    spring = mass * -linear.system.A()[9, 3]  # with the guys, which are soft
+    assert spring == pytest.approx(mass * 9.80665 / long + 1.0, rel=0.01)
+    k = math.sqrt(spring**2 + 1.0 / cost) - spring
+    c = math.sqrt(2.0 * mass * k + 1.0 / cost)
+    assert gain[0, [3, 9]] == pytest.approx([k, c], rel=0.01)
+    swing = math.sqrt(spring / mass) / math.tau
+    assert linear.modes().frequencies[:2] == pytest.approx([swing, swing], rel=0.01)
+    # One guy cannot hold the swing across it.
+    tree["cables"]["guy"] = guy | {"pairs": [["load", "x"]]}
+    tree |= {"anchors": dict.fromkeys(["hook", "x"], "xyz"), "actuated": {"x": ["guy load x"]}}
+    del tree["nodes"]["y"]
+    with pytest.raises(InputError, match="lqr"):
+        linearize(scenario_of(tree)).lqr(np.eye(12), [[cost]])
+
+
+def test_gains_grow_as_the_root_of_a_high_cost():
+    gains = [prism().lqr(cost * np.eye(36), np.eye(6)) for cost in (1e8, 1e10)]
+    assert gains[1] == pytest.approx(10.0 * gains[0], abs=0.02 * np.abs(gains[1]).max())
+    A, B, kept = prism().system.A(), prism().system.B(), prism().resisted
+    assert kept.shape == (36, 30), "three spins of bars are left out"
+    assert np.linalg.eigvals(kept.T @ (A - B @ gains[1]) @ kept).real.max() < -0.9
+
+
+def test_bristles_hold_the_nodes_that_stick_and_none_in_the_air():
+    # Three nodes bear the prism, each with a bristle of 300 N/m. All bodies move along x.
+    for modes, stiffness in ((None, 900.0), (np.zeros((6, MODE_COLUMNS)), 0.0)):
+        linear = linearize(PRISM, Robot.of(load_scenario(PRISM)).equilibrium.state, modes=modes)
+        along = [name.endswith(" x") for name in linear.states]
+        pushed = [name.endswith(" v_x") for name in linear.states]
+        acceleration = (linear.system.A() @ np.array(along, dtype=float))[pushed]
+        force = linear.robot.structure.mass @ acceleration
+        assert force == pytest.approx(-stiffness, rel=1e-6, abs=1e-4)
+
+
+def test_the_turn_of_a_spinning_body_from_another_is_carried_along():
+    # Both spin with w: exp(w t) exp(theta) = exp(exp(w t) theta) exp(w t).
+    robot, w = Robot.of(floating_prism()), np.array([0.3, -0.8, 0.5])
+    state = robot.structure.initial_state
+    state[21:24] = w
+    turning, turn = linearize(robot, state).system.A()[:3, :3], np.array([0.1, 0.2, 0.3])
+    expected = Rotation.from_rotvec(2.0 * w).apply(turn)
+    assert expm(2.0 * turning) @ turn == pytest.approx(expected, abs=1e-8)
+
+
+def test_the_page_shows_one_mode_with_damping(tmp_path):
+    study = study_equilibrium("prism")
+    save_structure_page(study, tmp_path / "mode.html", mode=2)
+    page = read_page(tmp_path / "mode.html")
+    film = json.loads(re.findall(r"const recording = (.*);", page)[0])
+    assert set(film["progress"]["values"]) == {study.damped.frequencies[1]}
+    poses = film["resolution"] * np.cumsum(film["poses"], axis=1).reshape(3, 7, -1)
+    assert 0.005 < np.ptp(poses[:, :3], axis=2).max() < 0.05
+    with pytest.raises(InputError) as caught:
+        save_structure_page(study, tmp_path / "none.html", mode=10)
+    assert (caught.value.key, (tmp_path / "none.html").exists()) == ("mode", False)
+
+
+PRISM, NO_GROUND = "prism", {"terrain": "!Nothing {}"}
+
+
+@functools.cache
+def prism() -> Linearization:
+    return linearize(PRISM)
+
+
+BAD = [
+    (lambda: linearize(PRISM, np.zeros(12)), "state"),
+    (lambda: linearize(PRISM, np.full(39, math.nan)), "state[0]"),
+    (lambda: linearize(PRISM, np.zeros(39)), "state"),
+    (lambda: linearize(PRISM, "upright"), "state"),
+    (lambda: linearize(PRISM, np.full(39, 1e308)), "state"),
+    (lambda: linearize(PRISM, modes=np.zeros((2, 12))), "modes"),
+    (lambda: linearize(PRISM, outputs="lengths"), "outputs"),
+    (lambda: linearize(PRISM, outputs=["length"]), "outputs"),
+    (lambda: linearize(PRISM, outputs=[5]), "outputs"),
+    (lambda: linearize("incline"), "robot"),
+    (lambda: linearize(load_scenario(PRISM).with_changes(NO_GROUND)), "robot"),  # it falls
+    (lambda: prism().lqr(np.eye(3), np.eye(6)), "state_cost"),
+    (lambda: prism().lqr(np.eye(36), np.eye(5)), "input_cost"),
+    (lambda: prism().lqr(-np.eye(36), np.eye(6)), "state_cost"),
+    (lambda: prism().lqr(np.tri(36), np.eye(6)), "state_cost"),
+    (lambda: prism().lqr(np.eye(36), np.zeros((6, 6))), ""),
+    (lambda: undamped().lqr(np.eye(36), np.zeros((0, 0))), "robot.actuated"),
+    (lambda: prism().lqr(np.eye(36), np.full((6, 6), math.nan)), "input_cost[0, 0]"),
+    (lambda: prism().controller(np.zeros((5, 36))), "gain"),
+    (lambda: prism().controller(np.full((6, 36), math.nan)), "gain[0, 0]"),
+    (lambda: linearize("winch").controller(np.zeros((8, 68))), "actuation"),
+]
+
+
+@pytest.mark.parametrize(("call", "key"), BAD)
+def test_what_does_not_fit_is_refused_in_one_line(call, key):
+    with pytest.raises(InputError) as caught:
+        call()
+    assert caught.value.key == key
+    assert "\n" not in str(caught.value)
+
+
+def test_a_robot_without_actuators_has_no_inputs():
+    linear = linearize(scenario_of(HUNG))
+    assert linear.system.B().shape == (12, 0) and linear.inputs == ()
+    assert linear.controller(np.zeros((0, 12)))(0.0, first_readings(linear.robot)).size == 0

@@ -1,0 +1,364 @@
+"""MJCF files, read into structures: those that the package writes, and others."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.anchored import supported_prism
+from pytest import approx
+
+from tetra_drake.cli import main
+from tetra_drake.engines.mjcf import make_mjcf
+from tetra_drake.lab.bridges.conversion import converted
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.shipped import shipped_structures
+from tetra_drake.scenario.structure_files import read_structure, save_structure
+from tetra_drake.study.equilibrium import robot_of_file, robot_of_structure
+
+mujoco = pytest.importorskip("mujoco")
+
+# A plate with a given inertia hangs by a ring on a cable, and a leg by a joint on the plate.
+HANGING = """
+unit: m
+nodes: {left: [-0.3, 0, 1], right: [0.3, 0, 1], side: [-0.4, 0.1, 0.2], ring: [0, 0, 0.8],
+        end: [0.1, 0, 0.7], float: [-0.1, 0, 0.7], hinge: [0.1, 0, 0.7], low: [0.1, 0, 0.4]}
+struts:
+  arm: {pairs: [[ring, end]], diameter: 1 cm, node_diameter: 0 m, density: 1 g/cm^3}
+  leg: {pairs: [[hinge, low]], diameter: 1 cm, node_diameter: 3 cm, density: 1 g/cm^3}
+cables:
+  loop: {pairs: [[left, ring, right]], stiffness: 500 N/m, damping: 1 N*s/m, free_length: 0.7 m}
+  stay: {pairs: [[low, side], [left, float], [right, end]], stiffness: 200 N/m, damping: 0 N*s/m,
+         free_length: 0.3 m}
+joints: {knee: {nodes: [end, hinge], stiffness: 1e9 N/m}}
+bodies:
+  plate: {struts: [arm], nodes: [float], mass: 0.8 kg, centre: [0.01, 0.02, 0.75],
+          inertia: [4 kg*m^2, 5 kg*m^2, 6 kg*m^2, 0.5 kg*m^2, 0 kg*m^2, -0.2 kg*m^2]}
+anchors: {left: xyz, right: xyz, side: xyz}
+actuated: {pull: [loop left ring right], both: [stay low side, stay left float]}
+"""
+
+# A rod stands on a floor at z = -1 and hangs on a box that the world holds by a hinge.
+OTHERS = """<mujoco><option gravity="1 0 -5"/><worldbody>
+  <geom name="floor" type="plane" size="9 9 1" pos="0 0 -1"/>
+  <geom name="wall" size="1" pos="9 9 9"/>
+  <site name="top left" pos="0 0 3"/>
+  <body name="box" pos="0 0 4"><joint name="door"/><geom size="0.1"/><site name="b.x"/></body>
+  <body name="rod" pos="0 0 1"><freejoint/><site name="high" pos="0 0 1"/>
+    <site name="arm" pos="0.2 0 0"/>
+    <geom name="bar 1" type="capsule" size="0.1" fromto="0 0 -1 0 0 1" mass="2" contype="0"
+      conaffinity="0"/>
+    <body pos="0 0 -1"><geom name="ball" size="0.25" mass="1"/><site name="foot"/></body></body>
+</worldbody><tendon>
+  <spatial name="t1" stiffness="10" springlength="0 0.5" limited="true" range="0 9">
+    <site site="high"/><site site="top left"/></spatial>
+  <spatial name="t2"><site site="arm"/><site site="b.x"/></spatial>
+  <spatial name="t3" stiffness="7"><site site="foot"/><site site="high"/></spatial>
+  <spatial name="t4"><site site="foot"/><site site="b.x"/></spatial>
+</tendon><actuator>
+  <general name="wind 1" tendon="t2" gainprm="80" biastype="affine" biasprm="40 -80 -2" gear="0.5"/>
+  <muscle name="flex" tendon="t1" lengthrange="1 2"/>
+</actuator></mujoco>"""
+
+
+LOOSE = OTHERS.replace("stiffness", "damping").replace("biasprm", "user")
+LOOSE = LOOSE.replace('limited="true" range="0 9"', "")
+ATTACHES = """<mujoco><asset><model name="x" file="{}"/></asset>
+  <worldbody><attach model="x" prefix="p"/></worldbody></mujoco>"""
+
+
+# A ball on a tether, with settings, and with the places of its sphere and of its node.
+TETHERED = """<mujoco>{}<worldbody><site name="o"/><body pos="0 0 1"><freejoint/>
+  <geom size="0.1" {}/><site name="a" pos="{}"/></body></worldbody><tendon>
+  <spatial stiffness="9" springlength="0 1"><site site="o"/><site site="a"/></spatial></tendon>
+</mujoco>"""
+
+
+# A ball on a rope and on a guy, with an option, a joint, attributes of the rope, and more.
+BALL = """<mujoco><option timestep="0.001">{option}</option><worldbody>
+  <site name="top" pos="0 0 2"/><site name="side" pos="0.8 0.1 1.4"/>
+  <body name="ball" pos="0 0 1.2" {body}>{joint}
+    <geom size="0.05" mass="1"/><site name="eye"/></body>
+</worldbody><tendon>
+  <spatial name="rope" {rope}><site site="top"/><site site="eye"/></spatial>
+  <spatial stiffness="60" springlength="0 0.5"><site site="side"/><site site="eye"/></spatial>
+</tendon>{more}</mujoco>"""
+SPRING = 'stiffness="100" springlength="0 0.6" damping="2"'
+FREE = '<joint name="root" type="free" {}/>'
+
+
+def ball(tmp_path: Path, **parts: str) -> Path:
+    """File with the ball, and parts of it."""
+    given = dict(option="", body="", joint="<freejoint/>", rope=SPRING, more="") | parts
+    (tmp_path / "ball.xml").write_text(BALL.format(**given))
+    return tmp_path / "ball.xml"
+
+
+def on_rope(actuator: str) -> str:
+    return f'<actuator><{actuator} name="pull" tendon="rope"/></actuator>'
+
+
+def left_at_rest(file: Path) -> np.ndarray:
+    """Acceleration in MuJoCo at control 0 of the ball where the structure has it at rest. At rest,
+    activations have reached their ends."""
+    structure = robot_of_structure(converted(file), str(file)).structure
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    bounds = (
+        model.actuator_actrange if model.actuator_actlimited.any() else model.actuator_ctrlrange
+    )
+    data.act[:] = np.clip(0.0, *bounds.T)[: model.na]
+    eye = structure.node_names.index("eye")
+    data.qpos[:3] = structure.p_WB[0] + structure.p_BN[eye]
+    mujoco.mj_forward(model, data)
+    return data.qacc[:3]
+
+
+def model_of(robot: Robot) -> Any:
+    return mujoco.MjModel.from_xml_string(make_mjcf(robot))
+
+
+def cables_of(model: Any) -> dict[frozenset[str], list[float]]:
+    """Stiffness, damping and free length of each tendon, by its sites."""
+    law = [model.tendon_stiffness, model.tendon_damping, model.tendon_lengthspring[:, 1]]
+    paths = np.split(model.wrap_objid, model.tendon_adr[1:])
+    sites = [frozenset(model.site(site).name for site in path) for path in paths]
+    return dict(zip(sites, np.transpose(law).tolist(), strict=True))
+
+
+def driven_by(robot: Robot) -> dict[str, set[frozenset[str]]]:
+    structure = robot.structure
+    names = [frozenset(name.split()[1:]) for name in structure.cable_names]
+    groups = zip(structure.oscillators, structure.groups, strict=True)
+    return {oscillator: {names[cable] for cable in group} for oscillator, group in groups}
+
+
+@pytest.mark.parametrize("name", [*shipped_structures(), "hanging.yaml"])
+def test_a_robot_is_the_same_after_a_way_to_mujoco_and_back(name: str, tmp_path: Path) -> None:
+    (tmp_path / "hanging.yaml").write_text(HANGING)
+    robot = robot_of_file(name if name in shipped_structures() else str(tmp_path / name))
+    file, model = tmp_path / "robot.xml", model_of(robot)
+    file.write_text(make_mjcf(robot))
+    structure = converted(file)
+    save_structure(structure, tmp_path / "robot.yaml", source="robot.xml")
+    assert read_structure(tmp_path / "robot.yaml") == structure
+    assert structure.ignored is None
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    given = structure.blueprint()
+    shifts = np.array([data.site(node).xpos for node in given.node_names]) - given.p_WN
+    raised = [0.0, 0.0, shifts[:, 2].mean()]  # out of the soft ground
+    np.testing.assert_allclose(shifts, [raised] * len(shifts), atol=1e-9)
+    again = Robot.of(robot.scenario.with_sections(robot=structure), at_rest=True)
+    back = model_of(again)
+    same = dict(rel=1e-9)
+    for ours, theirs in zip(robot.structure.bodies, range(1, model.nbody), strict=True):
+        body = back.body(ours.replace(" ", "_")).id
+        assert back.body_mass[body] == approx(model.body_mass[theirs], **same)
+        assert back.body_inertia[body] == approx(model.body_inertia[theirs], **same)
+    assert cables_of(back) == {path: approx(law, **same) for path, law in cables_of(model).items()}
+    assert driven_by(again) == driven_by(robot)
+    assert len(again.structure.joints) == len(robot.structure.joints)
+    assert again.structure.contact_radius.max() == approx(robot.structure.contact_radius.max())
+    assert again.structure.contacts.size == robot.structure.contacts.size
+
+
+def test_what_a_file_of_others_says(tmp_path: Path) -> None:
+    (tmp_path / "a.xml").write_text(OTHERS)
+    structure = converted(tmp_path / "a.xml")
+    assert structure.nodes["foot"] == approx([0, 0, 1])  # above the floor
+    assert structure.anchors == {"top_left": "xyz", "b_x": "xyz"}
+    assert [structure.struts["bar"].pairs, structure.contacts] == [[["high", "foot"]], ["foot"]]
+    assert structure.spheres["foot"].diameter == approx(0.5)
+    assert structure.gravity == approx(5.0)
+    rod = structure.bodies["rod"]
+    assert [rod.mass, rod.centre] == [approx(3.0), approx([0, 0, 2 - 1 / 3])]
+    t1, t2 = structure.cables["t"], structure.cables["t-2"]
+    assert [t1.stiffness, t1.free_length, t2.free_length] == [approx(10), approx(0.5), approx(1)]
+    assert [t2.stiffness, t2.damping] == [approx(20), approx(0.5)]
+    assert structure.actuated == {"wind_1": ["t-2 arm b_x"]}
+    told = "\n".join(structure.ignored or [])
+    for name in (
+        "door",
+        "wall",
+        "t3",
+        "t4",
+        "flex",
+        "'limited' of tendons, left out: t1",
+        "1 0 -5",
+    ):
+        assert name in told
+    assert "t2" not in told
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"body": 'gravcomp="0.4"'},
+        {"body": 'gravcomp="0.4"', "joint": FREE.format('actuatorgravcomp="true"')},
+        {"rope": "", "more": on_rope('position kp="500" ctrlrange="0.5 0.9"')},
+        {"rope": "", "more": on_rope('position kp="500" ctrlrange="0.5 0.9" timeconst="0.1"')},
+        {"rope": "", "more": on_rope('intvelocity kp="500" ctrlrange="-1 1" actrange="0.5 0.9"')},
+        {"more": on_rope('motor ctrlrange="-9 -3" gear="2"')},
+        {"more": on_rope('motor forcerange="-9 -3" gear="2"')},
+        {
+            "rope": "",
+            "more": on_rope('general gaintype="affine" gainprm="1 -9 -1" ctrlrange="2 3"'),
+        },
+        {
+            "option": '<flag spring="disable"/>',
+            "more": on_rope('position kp="80" ctrlrange="0.5 0.9"'),
+        },
+        {
+            "option": '<flag actuation="disable"/>',
+            "more": on_rope('position kp="80" ctrlrange="0.5 0.9"'),
+        },
+        {"option": '<flag limit="disable"/>', "rope": f'{SPRING} range="0 0.5"'},
+        {
+            "more": '<actuator><motor site="eye" refsite="side" gear="1 2 3 0 0 0" '
+            'ctrlrange="1 3"/><general site="eye" refsite="top" gear="0 0 1 0 0 0" '
+            'biastype="affine" biasprm="1 -40 -2"/></actuator>'
+        },
+    ],
+)
+def test_a_robot_rests_where_it_rests_in_mujoco_at_control_0(parts, tmp_path: Path) -> None:
+    assert left_at_rest(ball(tmp_path, **parts)) == approx([0.0, 0.0, 0.0], abs=1e-4)
+
+
+def test_what_acts_on_a_free_joint_is_told(tmp_path: Path) -> None:
+    acting = {"stiffness": 30, "damping": 3, "armature": 0.5, "frictionloss": 1}
+    given = " ".join(f'{name}="{value}"' for name, value in acting.items())
+    told = converted(ball(tmp_path, joint=FREE.format(given))).ignored
+    assert told == [f"the {name} of free joints, left out: root" for name in acting]
+
+
+def test_what_a_model_has_disabled_is_nothing(tmp_path: Path) -> None:
+    joint = FREE.format('stiffness="30" damping="3" frictionloss="1"')
+    off = '<flag damper="disable" frictionloss="disable" gravity="disable"/>'
+    file = ball(tmp_path, joint=joint, option=off, rope=f'{SPRING} range="0 0.4"')
+    structure = converted(file)
+    assert structure.gravity == 0.0
+    assert {cables.damping for cables in structure.cables.values()} == {0.0}
+    told = str(structure.ignored)
+    assert "'limited' of tendons, left out: rope" in told
+    assert "the stiffness of free joints" in told
+    assert "frictionloss" not in told
+    assert "the damping" not in told
+    for flag in ("limit", "constraint"):
+        file.write_text(file.read_text().replace("gravity=", f'{flag}="disable" gravity='))
+        assert "limited" not in str(converted(file).ignored)
+
+
+def test_a_limited_tendon_is_a_stiff_cable(tmp_path: Path) -> None:
+    limit = 'range="0.1 0.75" margin="0.02" solreflimit="0.004 1"'
+    file = ball(tmp_path, rope=limit)
+    robot = robot_of_structure(converted(file), str(file))
+    model = mujoco.MjModel.from_xml_path(str(file))
+    assert robot.structure.cables["free_length"][0] == approx(0.73)
+    model.dof_damping[:3] = 5.0
+    data = mujoco.MjData(model)
+    while data.time < 4.0:
+        mujoco.mj_step(model, data)
+    eye = robot.structure.p_WB[0] + robot.structure.p_BN[robot.structure.node_names.index("eye")]
+    assert eye == approx(data.site("eye").xpos, abs=1e-4)
+    assert [line for line in robot.scenario.robot.ignored if "lower limits" in line]
+
+
+def test_anchors_and_loads_come_back(tmp_path: Path) -> None:
+    changes = {"friction.stiffness": "0 N/m", "engine": "!Mujoco"}
+    scenario = supported_prism(**changes, robot__anchor_stiffness="3e5 N/m")
+    (tmp_path / "a.xml").write_text(make_mjcf(Robot.of(scenario, at_rest=True)))
+    structure, given = converted(tmp_path / "a.xml"), scenario.robot
+    assert [structure.anchors, structure.loads] == [given.anchors, given.loads]
+    held = [structure.anchor_stiffness, structure.anchor_time_constant]
+    assert held == approx([given.anchor_stiffness, given.anchor_time_constant])
+    assert structure.ignored is None
+
+
+GHOST = """<body name="ghost" pos="0 0 1"><freejoint/><geom size="0.01" mass="1e-9"/>
+  <site name="g"/></body><body name="aim" mocap="true" pos="0 0 1"/>"""
+REFERS = """<equality><weld body1="ghost" body2="aim"/></equality><sensor><framepos
+  objtype="body" objname="ghost"/></sensor><keyframe><key time="1"/></keyframe>"""
+LEASH = '<spatial stiffness="1"><site site="g"/><site site="eye"/></spatial></tendon>'
+
+
+def test_a_body_is_left_out_by_name(tmp_path: Path, refused) -> None:
+    file = ball(tmp_path, more=REFERS)
+    text = file.read_text().replace("</worldbody>", f"{GHOST}</worldbody>")
+    file.write_text(text.replace("</tendon>", LEASH))
+    assert "g" in converted(file).nodes
+    structure = converted(file, without=["ghost", "aim"])
+    assert [*structure.nodes] == ["top", "side", "eye"]
+    assert "ghost, aim" in str(structure.ignored)
+    for without in (["ghots"], ["ghost", "ghost"]):
+        with refused(file, "without", "'ghost'"):
+            converted(file, without=without)
+    made = tmp_path / "a.yaml"
+    assert main(["structure", str(file), "--without", "ghost", "aim", "--out", str(made)]) == 0
+    assert read_structure(made).nodes == structure.nodes
+
+
+def test_a_scenario_and_other_commands_tell_how_to_convert_a_file(tmp_path: Path, refused) -> None:
+    file, scenario = ball(tmp_path), tmp_path / "my.yaml"
+    scenario.write_text("base: prism\nname: my\nrobot: !Structure {file: ball.xml}\n")
+    reads = (load_scenario, scenario), (read_structure, file), (robot_of_file, str(file))
+    for read, name in reads:
+        with refused(file, "", "tetra-drake structure"):
+            read(name)
+
+
+def test_a_file_of_an_earlier_mujoco_means_the_same(tmp_path: Path) -> None:
+    settings = '<compiler coordinate="global"/><option><flag sensornoise="disable"/></option>'
+    old = TETHERED.format(settings, 'pos="0 0 1"', "0.1 0 1")
+    (tmp_path / "part").write_text(old)
+    (tmp_path / "old.xml").write_text('<mujoco><include file="part"/></mujoco>')
+    (tmp_path / "new.xml").write_text(TETHERED.format("", "", "0.1 0 0"))
+    included, new = (converted(tmp_path / f"{name}.xml") for name in ("old", "new"))
+    assert new.blueprint().p_WN.tolist() == [[0.1, 0, 1], [0, 0, 0]]
+    assert [included.nodes, included.bodies] == [new.nodes, new.bodies]
+    assert "sensornoise" in str(included.ignored)
+
+
+def test_the_command_writes_a_structure_file(tmp_path: Path, capsys) -> None:
+    file = tmp_path / "prism.xml"
+    file.write_text(make_mjcf(robot_of_file("prism")))
+    assert main(["structure", str(file), "--out", str(tmp_path / "mine.yaml")]) == 0
+    assert "mine: 3 bodies, 6 nodes, 9 cables, 6 oscillators, 60.83 g" in capsys.readouterr().out
+    text = (tmp_path / "mine.yaml").read_text()
+    assert text.startswith("# Converted from prism.xml by tetra-drake.\nformat: 1\nnodes:\n")
+
+
+def test_without_mujoco_the_error_says_how_to_install_it(monkeypatch, tmp_path, refused) -> None:
+    (tmp_path / "a.xml").write_text(OTHERS)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with refused(tmp_path / "a.xml", "", "pip install"):
+        converted(tmp_path / "a.xml")
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "fact"),
+    [
+        ("<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco>&b;</mujoco>", "", "document type"),
+        ("<mujoco", "", "is not XML"),
+        ("<foo/>", "", "mujoco refuses the file"),
+        ("<mujoco><nix/></mujoco>", "", "mujoco refuses the file"),
+        ("<mujoco/>", "tendon", "no spatial tendon"),
+        (LOOSE, "tendon", "without stiffness or limit, left out: t1, t2, t4"),
+        (LOOSE.replace("t4", "t4" * 99), "tendon", "to itself, left out: t3"),
+        (f"<mujoco><worldbody><body><{'nix' * 99}/></body></worldbody></mujoco>", "", "line 1"),
+        (
+            '<mujoco><asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
+            "",
+            "",
+        ),
+        (ATTACHES.format("a.xml"), "include", "twice"),
+    ],
+)
+def test_other_files_are_refused_in_one_line(text, key, fact, tmp_path, refused) -> None:
+    (tmp_path / "a.xml").write_text(text)
+    with refused(tmp_path / "a.xml", key, fact):
+        converted(tmp_path / "a.xml")

@@ -1,0 +1,219 @@
+"""Predictions with intervals, against what tolerances give by hand."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pandas
+import pytest
+from helpers.anchored import HUNG, SWINGING, scenario_of
+
+import tetra_drake as td
+from tetra_drake.cli import main
+from tetra_drake.lab.predict.predict import drawn_scenarios, predict, predictions_figure
+from tetra_drake.lab.predict.variates import variates_of
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.tolerances import Tolerance
+from tetra_drake.scenario.yaml_text import parse_yaml
+
+STIFFNESS, MASS = "robot.cables.line.stiffness", "robot.masses.b"
+WIDTH_90, BAR_MASS = 1.6449, math.pi * 0.004**2 * 0.2 * 1200.0
+
+
+def hung(**tolerances) -> Scenario:
+    """A bar with a mass at each end on one spring, with tolerances of the robot's numbers."""
+    return scenario_of(HUNG | {"tolerances": tolerances})
+
+
+def bounce(robot: StructureFile) -> float:
+    mass = sum(robot.masses.values()) + BAR_MASS
+    return math.sqrt(robot.cables["line"].stiffness / mass) / (2.0 * math.pi)
+
+
+def test_a_mass_on_a_spring_has_the_interval_and_the_shares_of_its_formula():
+    frequencies = [f"frequency {mode}" for mode in range(1, 6)]
+    both = hung(**{"cables.line.stiffness": "2 %", "masses.b": "4 % uniform"})
+    found = predict(both, frequencies, draws=24)
+    is_bounce = np.isclose(found.quantities["nominal"], bounce(both.robot), rtol=1e-6)
+    (mode,) = found.quantities.index[is_bounce]
+    mass = sum(both.robot.masses.values()) + BAR_MASS
+    parts = np.array([0.01, 0.02 / math.sqrt(3.0) * 0.3 / mass]) ** 2  # half of relative errors
+    shares = found.shares.loc[mode]
+    assert shares[STIFFNESS] == pytest.approx(parts[0] / parts.sum(), abs=5e-3)
+    assert shares[MASS] == pytest.approx(parts[1] / parts.sum(), abs=5e-3)
+    assert shares["rest"] < 1e-3
+    alone = predict(hung(**{"cables.line.stiffness": "2 %"}), [mode], draws=100)
+    median, low, high = alone.quantities.loc[mode, ["median", "low", "high"]]
+    assert median == pytest.approx(bounce(both.robot), rel=1e-3)
+    assert (high - low) / (2.0 * WIDTH_90 * median) == pytest.approx(0.01, rel=0.02)
+
+
+def test_nine_of_ten_robots_that_are_built_within_the_tolerances_are_in_the_interval():
+    tolerances = {"cables.line.stiffness": "2 %", "masses": "4 % uniform each"}
+    scenario = hung(**tolerances | {"cables.line.free_length": "1 mm uniform"})
+    line, masses = scenario.robot.cables["line"], np.array([*scenario.robot.masses.values()])
+    robots, generator = 300, np.random.default_rng(7)
+    stiffness = line.stiffness * (1.0 + 0.02 * generator.standard_normal(robots))
+    errors = generator.uniform(-0.04, 0.04, (robots, 2))
+    mass = BAR_MASS + (masses * (1.0 + errors)).sum(axis=1)
+    free_length = line.free_length + generator.uniform(-1e-3, 1e-3, robots)
+    weight = 9.81 * mass
+    built = {"tension line": weight, "length line": free_length + weight / stiffness}
+    found = predict(scenario, [*built], draws=40).quantities
+    for name, values in built.items():
+        low, high = found.loc[name, ["low", "high"]]
+        assert 0.8 < np.mean((low < values) & (values < high)) < 0.97
+
+
+def test_numbers_of_one_key_vary_together_or_each_alone_and_struts_get_longer():
+    pair = ["tension side n0 n3", "tension side n1 n4"]
+    prism, key = load_scenario("prism"), "cables.side.stiffness"
+    known = [prism.with_changes({"robot.tolerances": {key: size}}) for size in ("2 %", "2 % each")]
+    together, alone = (predict(each, pair, draws=6).draws for each in known)
+    assert together[pair[0]].to_list() == pytest.approx(together[pair[1]].to_list(), rel=1e-6)
+    assert not np.allclose(alone[pair[0]], alone[pair[1]], rtol=1e-4)
+
+    def length(study):
+        a, b = study.robot.scenario.robot.struts["bar"].pairs[0]
+        return np.linalg.norm(np.subtract(*study.nodes.loc[[a, b], ["x", "y", "z"]].to_numpy()))
+
+    longer = hung(**{"struts.bar.length": "1 mm uniform"})
+    row = predict(longer, {"length": length}, draws=40).quantities.iloc[0]
+    assert [row["low"], row["high"]] == pytest.approx(
+        row["nominal"] + np.array([-9e-4, 9e-4]), abs=2e-5
+    )
+
+
+def test_the_free_end_of_an_anchored_bar_moves_by_all_of_its_lengthening():
+    known = {"tolerances": {"struts.bar.length": "1 mm uniform"}}
+    found = predict(scenario_of(SWINGING | known), ["a z", "b z"], draws=40).quantities
+    middle, width = found["nominal"], found["high"] - found["low"]
+    assert found.loc["b z", "low"] == pytest.approx(middle["b z"] - 9e-4, abs=2e-5)
+    assert width["b z"] == pytest.approx(1.8e-3, abs=4e-5) and width["a z"] < 1e-8
+
+
+@pytest.mark.parametrize(
+    "anchors",
+    [
+        {},
+        {"a": "xyz"},
+        {"b": "xyz"},
+        {"a": "x", "b": "z"},
+        {"a": "y", "b": "y"},
+        {"a": "xyz", "b": "y"},
+    ],
+    ids=lambda anchors: "_".join(map("".join, anchors.items())),
+)
+def test_a_longer_bar_keeps_what_anchors_hold(anchors):
+    nodes = {"a": [0.0, 0.1, 0.3], "b": [0.4, 0.1, 0.0]}
+    ladder = scenario_of(SWINGING | {"nodes": nodes, "anchors": anchors})
+    known = {"robot.struts.bar.length": Tolerance(size="1 mm")}
+    (drawn,) = drawn_scenarios(ladder, variates_of(ladder.model_dump(), known), np.ones((1, 1)))
+    moved = drawn.robot.nodes
+    assert math.dist(moved["a"], moved["b"]) == pytest.approx(0.501, abs=3e-6)
+    for node, axes in anchors.items():
+        for axis in axes:
+            assert moved[node]["xyz".index(axis)] == nodes[node]["xyz".index(axis)]
+
+
+def test_a_tolerance_in_a_text_is_one_of_the_section_and_is_kept():
+    given = {"robot.cables.side.stiffness": "110 N/m ± 2 % uniform"}
+    given |= {"ground.stiffness": "9 kN/m +/- 1 kN/m"}
+    scenario = load_scenario("prism").with_changes(given)
+    assert scenario.robot.tolerances["cables.side.stiffness"].law == "uniform"
+    assert scenario.robot.cables["side"].stiffness == 110.0
+    assert [*scenario.all_tolerances] == ["robot.cables.side.stiffness", "ground.stiffness"]
+    text = dump_scenario(scenario)
+    assert Scenario.from_tree(parse_yaml(text, "x"), "x") == scenario
+    assert "tolerances" not in dump_scenario(load_scenario("prism"))
+
+
+def test_draws_without_result_are_counted_and_the_same_seed_gives_the_same(tmp_path, capsys):
+    scenario = load_scenario("prism").with_changes(
+        {"robot.tolerances": {"cables.side.stiffness": "90 %"}}
+    )
+    first, again = (predict(scenario, ["n3 z"], draws=4, seed=2) for _ in range(2))
+    pandas.testing.assert_frame_equal(first.draws, again.draws)
+    failed = int((first.draws["failure"] != "").sum())
+    assert 0 < failed < 4 and first.quantities["draws"].to_list() == [4 - failed]
+    assert any(note.startswith(f"{failed} of 4 draws have no result") for note in first.notes)
+    file = tmp_path / "my.yaml"
+    file.write_text("base: prism\ntolerances: {robot.cables.side.stiffness: 2 %}\n")
+    assert main(["predict", str(file), "--draws", "5", "--out", str(tmp_path / "out")]) == 0
+    assert "tension side" in capsys.readouterr().out
+    table = pandas.read_csv(tmp_path / "out/predictions.csv", index_col="quantity")
+    assert table.loc["tension side", "low"] < table.loc["tension side", "high"]
+    assert json.loads((tmp_path / "out/summary.json").read_text())["draws"] == 5
+    assert "tension side" in (tmp_path / "out/predict.html").read_text()
+
+
+def test_draws_are_simulated_with_a_gait():
+    changes = {"tolerances": {"ground.stiffness": "20 %"}, "simulation.duration": "1.6 s"}
+    scenario = load_scenario("prism").with_changes(changes)
+    measures = {"way": "distance", "own": lambda result: result.metrics.distance}
+    gait = td.seeded_gait(scenario, 1)
+    draws = predict(scenario, measures, gait=gait, draws=8).draws
+    assert draws["way"].nunique() == 8 and draws["way"].equals(draws["own"])
+    # Quantities in motion and at rest together are those of each kind alone.
+    at_rest = ["frequency 1", "n3 z"]
+    both = predict(scenario, ["distance", *at_rest], gait=gait, draws=8).draws
+    assert both["distance"].equals(draws["way"].rename("distance"))
+    alone = predict(scenario, at_rest, draws=8).draws
+    np.testing.assert_allclose(both[at_rest], alone[at_rest], rtol=1e-6)
+
+
+def test_the_figure_shows_percent_of_the_nominal_value_or_nothing():
+    made = predict(hung(**{"masses": "2 % each"}), ["frequency 1", "tension line"], draws=8)
+    names = ["wide", "narrow", "zero"]
+    numbers = {"nominal": [0.57, -2.0, 0.0], "median": [0.9, -2.0, 0.0], "low": [0.5, -2.1, -1.0]}
+    numbers |= {"high": [1.9, -1.9, 1.0], "unit": "m", "draws": 8}
+    shares = made.shares.reindex(names)
+    made = replace(made, quantities=pandas.DataFrame(numbers, index=names), shares=shares)
+    panel = predictions_figure(made).axes[0]
+    zero, narrow, wide = panel.collections[0].get_segments()
+    assert wide[:, 0] == pytest.approx([100 * (0.5 / 0.57 - 1), 100 * (1.9 / 0.57 - 1)])
+    assert narrow[:, 0] == pytest.approx([-5.0, 5.0])
+    assert np.isnan(zero).any() or not len(zero), "an interval of 2 m about 0 is no share of it"
+    assert [text.get_position()[1] for text in panel.texts] == [0]
+
+
+@pytest.mark.parametrize(
+    ("key", "given", "problem"),
+    [
+        ("struts.bar.length", "100 %", "smaller than the number"),
+        ("struts.bar.length", "1 m", "smaller than the number"),
+        ("cables.line.stiffness", "-2 %", "0 or more"),
+        ("cables.line.stiffness", 5, "N/m"),
+        ("cables.line.stiff", "2 %", "did you mean 'cables.line.stiffness'"),
+        ("cables.line", "2 %", "several units"),
+        ("nodes", "2 % of", "converts to m"),
+        ("masses", "2 % 3 %", "expected a number, or a share"),
+        pytest.param("masses", 10**400, "converts to kg", id="beyond floats"),
+    ],
+)
+def test_a_tolerance_that_fits_no_number_is_refused(key, given, problem, refused):
+    with refused("scenario anchored", f"robot.tolerances.{key}", problem):
+        hung().with_changes({"robot.tolerances": {key: given}})
+
+
+def test_a_length_between_anchors_has_no_tolerance(refused):
+    held = scenario_of(SWINGING | {"anchors": {"a": "z", "b": "z"}})
+    with refused("scenario anchored", "robot.tolerances.struts.bar.length", "key nodes"):
+        held.with_changes({"robot.tolerances": {"struts.bar.length": "1 mm"}})
+
+
+def test_no_tolerance_no_draw_and_no_such_quantity_are_refused(refused):
+    with refused("scenario anchored", "tolerances", "found none"):
+        predict(hung(), ["frequency 1"])
+    known = hung(**{"masses": "2 % each"})
+    for arguments in ({"draws": 0}, {"quantities": []}, {"command": "forward"}):
+        with refused("predict", *arguments):
+            predict(known, **({"quantities": ["frequency 1"]} | arguments))
+    with refused("predict", "quantities.height", "found 5"):
+        predict(known, {"height": 5})
+    for name in ("tension lines", "speed", "frequency x"):
+        with refused("predict", f"quantities.{name}"):
+            predict(known, [name])

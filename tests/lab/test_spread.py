@@ -1,0 +1,79 @@
+"""Ranges of a gait's metrics for moved starts, and where they are shown."""
+
+import dataclasses
+import re
+
+import pytest
+from helpers.synthetic_run import tiny_scenario, write_run
+
+import tetra_drake as td
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.entries import SPREADS
+from tetra_drake.evolution.run import load_run
+from tetra_drake.formatting import uncertain
+from tetra_drake.lab.spread import record_spread
+from tetra_drake.report.result_folder import save_result_folder
+from tetra_drake.report.summary import result_text
+from tetra_drake.results.result import headline
+from tetra_drake.settings.units import shown_in
+
+
+def test_a_spread_repeats_and_holds_the_unmoved_start_and_grows_with_chaos(scenario):
+    short = scenario.with_changes({"engine": "!Compiled", "simulation.duration": "4 s"})
+    gait = td.seeded_gait(short, 80)
+    ranges = td.spread(short, gait)
+    assert ranges == td.spread(short, gait, workers=1) != td.spread(short, gait, seed=1)
+    low, high = ranges["distance"]
+    assert low <= td.simulate(short, gait).metrics.distance <= high
+    # The law of the thesis enlarges 100 nm, friction without steps hardly does.
+    smooth = td.spread(short.with_changes({"friction": "!Coulomb"}), gait)["distance"]
+    assert 1e-9 < smooth[1] - smooth[0] < 1e-5 and high - low > 2.0 * (smooth[1] - smooth[0])
+    with pytest.raises(InputError, match="seed"):
+        td.spread(short, gait, seed=-1)
+
+
+@pytest.mark.parametrize(
+    ("shown", "value", "low", "high", "text"),
+    [
+        ("14.3", 14.34, 14.33, 14.45, "14.3"),
+        ("5.212", 5.2123, 3.1, 6.04, "5.2 (3.1 to 6.0)"),
+        ("5.212", 5.2123, 5.19, 5.22, "5.212 (5.190 to 5.220)"),
+        ("312", 312.0, -40.0, 600.0, "312 (-40 to 600)"),
+        ("5.2", 5.2, float("nan"), float("nan"), "5.2"),
+    ],
+)
+def test_a_number_has_the_digits_that_its_range_allows(shown, value, low, high, text):
+    assert uncertain(shown, value, low, high) == text
+
+
+def test_titles_follow_what_the_robot_did():
+    metrics = {"distance": -1.25, "rolled": -13.5}
+    spread = {"distance": [-1.9, -0.2], "rolled": [-13.51, -13.49]}
+    rolling = tiny_scenario().with_changes({"objective": {"rolled": "1 /rad"}})
+    with shown_in("SI"):
+        title = headline(rolling, metrics, spread)
+    moved = "under starts moved by 1e-7 m"
+    assert title == f"rolls 2.1 turns backward, 1.2 m (0.2 to 1.9 {moved}) backward in 0.3 s"
+    assert headline(tiny_scenario(), metrics | {"rolled": 1.0}).startswith("walks ")
+
+
+def test_a_run_and_a_result_keep_their_ranges_and_show_them(tmp_path):
+    tiny = tiny_scenario().with_changes({"engine": "!Compiled"})
+    folder = write_run(tmp_path / "run", [[[(1.0, 0)], [(2.0, 0)]]], scenario=tiny)
+    record_spread(folder)
+    record_spread(folder)  # it is there
+    assert len((folder / SPREADS).read_text().splitlines()) == 1
+    run = load_run(folder)
+    assert run.spread_of(run.fittest()) == td.spread(tiny, run.best_gait())
+    assert run.spread_of(run.initial_best(0)) == {}
+    slow = write_run(tmp_path / "slow", [[[(1.0, 0)]]])  # on the diagram, after one gait
+    record_spread(slow)
+    assert not (slow / SPREADS).exists()
+
+    result = td.simulate(tiny, run.best_gait(), record=True)
+    wide = dataclasses.replace(result, spread={"distance": [-1.0, 1.0]})
+    save_result_folder(tmp_path / "out", wide)
+    loaded = td.load_result(tmp_path / "out")
+    assert loaded.spread == wide.spread and "(-39 to 39" in loaded.title
+    assert re.search(r"distance \(in\) .* \(-39 to 39\)", result_text(loaded))
+    assert "brackets" not in result_text(result)

@@ -1,0 +1,1 @@
+"""Files of other software: MuJoCo and NTRT in, SDFormat out."""

@@ -1,0 +1,39 @@
+"""Conversion of files of MuJoCo and NTRT to structures."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+from tetra_drake.errors import InputError
+from tetra_drake.lab.bridges.mjcf import mjcf_tree
+from tetra_drake.lab.bridges.ntrt import ntrt_tree
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.structure_files import foreign_format, structure_of
+from tetra_drake.settings.units import given_quantity
+
+
+def converted(
+    file: Path, *, unit: str | None = None, without: Collection[str] = ()
+) -> StructureFile:
+    """Structure of an MJCF file, or of a file of NTRT (NASA Tensegrity Robotics Toolkit).
+
+    Args:
+        file: the file.
+        unit: unit of length of a file of NTRT, such as "dm"; it has bare numbers.
+        without: names of bodies of an MJCF file that are left out.
+
+    Raises:
+        InputError: names file and key.
+    """
+    if foreign_format(file) == "MuJoCo":
+        content = mjcf_tree(file, without=without)
+        if unit is not None:
+            content["unit"] = unit
+        return structure_of(content, file)
+    if without:
+        problem = f"found {', '.join(without)}, expected bodies of a file of MuJoCo"
+        raise InputError(file, "without", problem)
+    if unit is None:
+        raise InputError(file, "unit", "is missing; give the unit of length, such as dm")
+    return structure_of(ntrt_tree(file, unit=given_quantity(f"1 {unit}", "m", file, "unit")), file)

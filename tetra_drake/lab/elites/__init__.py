@@ -1,0 +1,1 @@
+"""Quality diversity: its optimiser, and maps of gaits."""

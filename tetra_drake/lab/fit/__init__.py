@@ -1,0 +1,1 @@
+"""Fits of scenario values to measurements of a robot."""

@@ -1,0 +1,1 @@
+"""Small motions about a state: Drake's LinearSystem, modes and LQR."""

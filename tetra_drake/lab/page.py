@@ -1,0 +1,64 @@
+"""Page of a study in a folder: text, tables, notes and a figure, for browsers and in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from tetra_drake.files import write_whole
+from tetra_drake.formatting import TextTable, render
+from tetra_drake.scenario.load import SCENARIO
+
+README = "README.md"
+
+
+def write_page(
+    folder: Path,
+    name: str,
+    *,
+    title: str,
+    about: str,
+    table: TextTable,
+    notes: Sequence[str],
+    unknown: str = "",
+    figure: str,
+    caption: str,
+    second: TextTable,
+    content: str,
+) -> list[str]:
+    """Writes the page of a study, as HTML to the file `name` and in Markdown to README.md.
+
+    Args:
+        folder: the folder, which also has the scenario and the figure.
+        name: name of the HTML file.
+        title: heading of the page.
+        about: how the study was made.
+        table: main results.
+        notes: warnings, each one a paragraph.
+        unknown: what an unknown interval means, if there is one.
+        figure: name of the figure's file, without .svg.
+        caption: what the figure shows, for readers who do not see it.
+        second: a further table, below the figure.
+        content: what the scenario's file has, such as "has the fitted values".
+
+    Returns:
+        The names of the files.
+
+    Raises:
+        InputError: if a file cannot be written.
+    """
+    paragraphs = [
+        f"# {title}",
+        about,
+        table.markdown(),
+        "\n".join(f"- {note}" for note in notes),
+        unknown,
+        f"![{caption}]({figure}.svg)",
+        second.markdown(),
+        f"[{SCENARIO}]({SCENARIO}) {content}.\n",
+    ]
+    write_whole(folder / README, "\n\n".join(filter(None, paragraphs)))
+    shown = {"title": title, "about": about, "table": table, "notes": notes, "unknown": unknown}
+    shown |= {"figure": figure, "caption": caption, "second": second, "content": content}
+    write_whole(folder / name, render("lab/page.html.jinja", **shown, scenario=SCENARIO))
+    return [name, README]

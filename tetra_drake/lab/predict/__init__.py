@@ -1,0 +1,1 @@
+"""Predictions with intervals, from tolerances of a robot's numbers."""
