@@ -358,7 +358,7 @@ def prism() -> Linearization:
 
 BAD = [
     (lambda: linearize(PRISM, np.zeros(12)), "state"),
-    (lambda: linearize(PRISM, np.full(39, math.nan)), "state"),
+    (lambda: linearize(PRISM, np.full(39, math.nan)), "state[0]"),
     (lambda: linearize(PRISM, np.zeros(39)), "state"),
     (lambda: linearize(PRISM, "upright"), "state"),
     (lambda: linearize(PRISM, np.full(39, 1e308)), "state"),
@@ -374,9 +374,9 @@ BAD = [
     (lambda: prism().lqr(np.tri(36), np.eye(6)), "state_cost"),
     (lambda: prism().lqr(np.eye(36), np.zeros((6, 6))), ""),
     (lambda: undamped().lqr(np.eye(36), np.zeros((0, 0))), "robot.actuated"),
-    (lambda: prism().lqr(np.eye(36), np.full((6, 6), math.nan)), "input_cost"),
+    (lambda: prism().lqr(np.eye(36), np.full((6, 6), math.nan)), "input_cost[0, 0]"),
     (lambda: prism().controller(np.zeros((5, 36))), "gain"),
-    (lambda: prism().controller(np.full((6, 36), math.nan)), "gain"),
+    (lambda: prism().controller(np.full((6, 36), math.nan)), "gain[0, 0]"),
     (lambda: linearize("winch").controller(np.zeros((8, 68))), "actuation"),
 ]
 

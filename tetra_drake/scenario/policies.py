@@ -42,6 +42,10 @@ class DrivenRobots(NamedTuple):
     size: np.ndarray
     """Lengths of the first strut (N,)."""
 
+    def signals_of(self, setpoints: np.ndarray) -> np.ndarray:
+        """Signals (N, driven) in N from setpoints of the actuators."""
+        return np.asarray(self.actuation.signals(setpoints, self.cables.law), dtype=float)
+
     def as_given(self, signals: np.ndarray) -> np.ndarray:
         """Signals (N, driven) in N for robots without a network, from signals like a network's. For
         motors that imitate a cable's spring, they are the whole tension at the start's length."""

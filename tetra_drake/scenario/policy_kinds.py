@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, checked_numbers
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.policies import DrivenRobots, PolicyBounds, PolicyKind, driven_names
 from tetra_drake.settings.quantities import Time
@@ -179,16 +179,8 @@ class PythonPolicy(PolicyKind):
 
     def signals(self, robots: DrivenRobots, readings: Any, values: np.ndarray) -> np.ndarray:
         given = imported_function(self.function)(readings, values, robots)
-        actions, shape = np.asarray(given), robots.rest.shape
-        if actions.shape != shape or actions.dtype.kind not in "iuf":
-            found = f"an array of {actions.dtype} of shape {actions.shape}"
-            problem = f"returned {found}, expected numbers of shape {shape}"
-            raise InputError("policy.function", self.function, problem)
-        if not np.isfinite(actions).all():
-            time = readings.time[np.argwhere(~np.isfinite(actions))[0][0]]
-            problem = f"returned a number that is not finite, at {time:g} s"
-            raise InputError("policy.function", self.function, problem)
-        return np.asarray(robots.actuation.signals(actions, robots.cables.law), dtype=float)
+        source, key, shape = "policy.function", self.function, robots.rest.shape
+        return robots.signals_of(checked_numbers(given, shape, source=source, key=key, finite=True))
 
 
 @functools.cache
