@@ -31,7 +31,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from tetra_drake.engines.sampler import Sampler
 from tetra_drake.evolution.run import load_run
 from tetra_drake.results.trajectory import make_dataset, sample_times
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.measures import distance_walked
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario

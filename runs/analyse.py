@@ -30,7 +30,8 @@ from tetra_drake.laws.terrain import Flat, Rough
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, ParameterSpace
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario

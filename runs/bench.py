@@ -41,7 +41,7 @@ from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.optimizers.base import Task as Candidate
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind
 from tetra_drake.scenario.scenario import Scenario

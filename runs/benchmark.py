@@ -44,7 +44,8 @@ from tetra_drake.formatting import TextTable, fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, controlled_robot
-from tetra_drake.robot.gait import Gait, seeded_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import node_positions

@@ -36,7 +36,7 @@ from tetra_drake.formatting import fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, Iteration, Optimizer
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario.experiment_sections import EvolutionSection
 
 EVALUATIONS, ON_DIAGRAM = 600, 60

@@ -18,7 +18,7 @@ from helpers.brief import BRIEF
 import tetra_drake as td
 from tetra_drake.errors import InputError
 from tetra_drake.report.result_folder import save_result_folder
-from tetra_drake.robot.gait import save_gait
+from tetra_drake.robot.gait_file import save_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 

@@ -12,7 +12,8 @@ import pytest
 
 from tetra_drake.cli import main, make_parser
 from tetra_drake.formatting import rounded
-from tetra_drake.robot.gait import save_gait, seeded_gait
+from tetra_drake.robot.gait_file import save_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.load import load_scenario
 
 SHORT = """\

@@ -83,7 +83,7 @@ def scenario_and_gait(
     `gait` is a gait file or the folder of a run. Without it, the gait is random, by `seed` or by a
     seed that walks. The scenario has the body that evolved with the gait, if any."""
     from tetra_drake.evolution.run import load_source
-    from tetra_drake.robot.gait import WALKING_SEED, seeded_gait, with_body
+    from tetra_drake.robot.parameter_space import WALKING_SEED, seeded_gait, with_body
     from tetra_drake.scenario.load import load_scenario
 
     if gait is None:

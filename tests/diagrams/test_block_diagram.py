@@ -5,7 +5,7 @@ import re
 import pytest
 from block_diagram import graphviz_source, save_block_diagram
 
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 

@@ -23,7 +23,7 @@ from tetra_drake.engines.engine import engine_of
 from tetra_drake.laws.actuator import Actuation, TensionMotor, Winch
 from tetra_drake.laws.cable import PASSIVE
 from tetra_drake.laws.inertia import XX
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.engine_kinds import Compiled, Drake

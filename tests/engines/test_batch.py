@@ -7,7 +7,7 @@ from helpers.converged import shortly
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import Diverged
 from tetra_drake.robot.command import controlled_robot, driven_robot
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
 

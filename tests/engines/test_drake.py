@@ -12,7 +12,9 @@ from tetra_drake.engines.sampler import Sampler
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.terrain import Rough
 from tetra_drake.results.trajectory import make_dataset
-from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.scenario import Scenario

@@ -16,8 +16,8 @@ from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough, Steps
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.measures import path_of_centre
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario

@@ -22,8 +22,8 @@ from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.terrain import Flat
-from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import foot_gaps, make_surface
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario

@@ -17,8 +17,8 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import ResetIntegrator
 from tetra_drake.laws.terrain import Flat, Incline, Rough
-from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import ground_frames
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Drake

@@ -33,7 +33,7 @@ from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces, compute_state_forces
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import AddBodies, moved_nodes

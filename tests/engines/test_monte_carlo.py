@@ -10,7 +10,7 @@ from pydrake.systems.analysis import MonteCarloSimulation, RandomSimulation, Sim
 
 from tetra_drake.engines.drake import MakeDisturbedSimulator
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario

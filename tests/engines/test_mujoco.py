@@ -15,7 +15,7 @@ from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Incline
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario

@@ -15,7 +15,9 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.matsuoka import Weights
-from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario

@@ -11,7 +11,7 @@ from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.gym import TensegrityEnv
 from tetra_drake.laws.terrain import Incline
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures

@@ -8,7 +8,8 @@ import pytest
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import ParameterSpace, load_gait
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 
 WELL_CONDITIONED = [f"gait_{letter}" for letter in "bcdefgh"]

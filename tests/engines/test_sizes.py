@@ -8,7 +8,7 @@ from helpers.converged import shortly
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.command import driven_robot
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario

@@ -34,7 +34,7 @@ from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.report import run_page
 from tetra_drake.report.result_folder import save_result
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario

@@ -8,7 +8,7 @@ from helpers.analytic import tasks_of
 
 from tetra_drake.evolution import evaluators
 from tetra_drake.evolution.evaluators import LentExecutor, WorkerProcesses
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.parameter_space import ParameterSpace
 
 
 @pytest.fixture(scope="session")

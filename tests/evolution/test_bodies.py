@@ -18,7 +18,8 @@ from tetra_drake.evolution.trials import BEST_SCENARIO
 from tetra_drake.experiment import evolve
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.robot.gait import ParameterSpace, load_gait, seeded_gait, with_body
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import ParameterSpace, seeded_gait, with_body
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState

@@ -18,7 +18,7 @@ from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.laws.terrain import Steps
 from tetra_drake.optimizers.base import Task
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.experiment_sections import Disturbances
 

@@ -13,7 +13,7 @@ from tetra_drake.engines.time_limit import check_time
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import in_lanes, on_executor
 from tetra_drake.optimizers.base import Task
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.parameter_space import ParameterSpace
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.optimizers.base import Task
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.settings.units import INCH
 
 

@@ -7,7 +7,7 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.evolution.run import load_run, load_source
-from tetra_drake.robot.gait import given_gait, save_gait
+from tetra_drake.robot.gait_file import given_gait, save_gait
 from tetra_drake.scenario.load import dump_scenario
 
 

@@ -19,7 +19,7 @@ from tetra_drake.evolution.evaluators import Evaluator, Submit, evaluate_all, on
 from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.evolution.trials import TrialStatus, open_trials, run_trials
 from tetra_drake.optimizers.base import Evaluate, Evaluation, Iteration, MakeOptimizer, Task
-from tetra_drake.robot.gait import Vector
+from tetra_drake.robot.parameter_space import Vector
 from tetra_drake.scenario.disturbances import IterationSeed
 from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import load_scenario

@@ -13,7 +13,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import Structure

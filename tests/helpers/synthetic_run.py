@@ -13,7 +13,7 @@ from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.trials import RepeatedFile
 from tetra_drake.optimizers.base import Evaluation, Task
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.scenario import Scenario

@@ -18,7 +18,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.films.browser import do, wait_until_loaded
 from tetra_drake.lab.films.video import make_video
 from tetra_drake.report.run_page import write_report
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH

@@ -14,7 +14,8 @@ from tetra_drake.errors import InputError
 from tetra_drake.lab.prototype.export import COMMAND, EXPECTED, LIMITS_FILE, README, export
 from tetra_drake.laws.actuator import LimitedActuator, Winch
 from tetra_drake.robot.command_file import load_command
-from tetra_drake.robot.gait import load_gait, seeded_gait
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 

@@ -24,7 +24,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.lab.linearization.linearization import Linearization, linearize
 from tetra_drake.lab.linearization.rates import rates_and_forces
 from tetra_drake.laws.contact import MODE_COLUMNS
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.readings import first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions

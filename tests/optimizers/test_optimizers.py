@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from tetra_drake.lab.elites import quality_diversity
 from tetra_drake.optimizers import cma_es, optimizer_of
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState
 
 LEARNING = [CmaEs(sample=0), CmaEs(sample=20)]

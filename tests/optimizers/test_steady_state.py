@@ -15,7 +15,7 @@ from tetra_drake.optimizers.steady_state import (
     mutation_steps,
     select_parent,
 )
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario import optimizer_kinds as kinds
 
 DRAWS = 2000

@@ -8,7 +8,7 @@ from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.report.result_folder import save_result_folder
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 
 TRIALS = [
     [[(2.0, 0), (-1.0, 1), (None, 2)], [(3.0, 1), (1.0, None)]],

@@ -4,7 +4,7 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.report.run_page import write_figures
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
 OF_ONE_GAIT = {"gait_diagram", "time_lapse", "path_of_the_centre", "relative_distances"}

@@ -20,7 +20,7 @@ from tetra_drake.report.result_folder import (
     write_replay,
 )
 from tetra_drake.results.result import headline
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
 

@@ -24,7 +24,7 @@ from tetra_drake.report.run_page import (
 )
 from tetra_drake.report.summary import run_text
 from tetra_drake.results.result import headline
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH

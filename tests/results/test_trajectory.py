@@ -10,7 +10,7 @@ from helpers.made_up_walk import make_walk
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.results.trajectory import VARIABLES, sample_times
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 

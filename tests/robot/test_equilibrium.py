@@ -14,7 +14,7 @@ from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Incline
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.equilibrium import Factor
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, TIP

@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tetra_drake.robot.gait import Gait, ParameterSpace, load_gait, save_gait, seeded_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait, save_gait
+from tetra_drake.robot.parameter_space import ParameterSpace, seeded_gait
 from tetra_drake.scenario.load import load_scenario
 
 NAMES = [

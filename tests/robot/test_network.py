@@ -7,7 +7,7 @@ import pytest
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.matsuoka import Weights
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
 

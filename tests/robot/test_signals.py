@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import save_signals, signal_samples
 from tetra_drake.settings.units import shown_in

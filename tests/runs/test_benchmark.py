@@ -6,7 +6,7 @@ import benchmark
 from helpers.converged import shortly
 from pydrake.systems.analysis import GetIntegrationSchemes
 
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 
 FEW = {"GAITS": 2, "BATCHES": (1, 2), "GROUND_BATCH": 1, "CONTROLLED": (2,), "ROUNDS": 1}

@@ -7,9 +7,9 @@ import pytest
 from helpers.laws import UNEVEN
 from scipy.interpolate import NdBSpline
 
+from tetra_drake.laws.height_field import HeightField
 from tetra_drake.laws.terrain import (
     Grid,
-    HeightField,
     Incline,
     Obstacles,
     Rough,

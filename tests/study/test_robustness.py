@@ -12,7 +12,8 @@ from helpers.synthetic_run import tiny_scenario
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.robot.gait import save_gait, seeded_gait
+from tetra_drake.robot.gait_file import save_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws, fresh_seed
 from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario

@@ -10,7 +10,8 @@ from helpers.converged import shortly
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.robot.gait import save_gait, seeded_gait
+from tetra_drake.robot.gait_file import save_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.scenario import Scenario

@@ -25,8 +25,8 @@ from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.contact import GroundSection, NormalForce
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Flat
-from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import make_surface
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems import AddCables, AddFrame, AddGroundContact, Cable

@@ -14,7 +14,9 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from tetra_drake.laws.contact import CONTACT, MODE, MODE_COLUMNS
 from tetra_drake.laws.friction import STICK
-from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario

@@ -9,7 +9,7 @@ import pytest
 from helpers.converged import shortly
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.visualization.live import FRAMES_PER_SECOND, LiveView, open_view
 
 HANDSHAKE = (

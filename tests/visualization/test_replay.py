@@ -17,7 +17,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.films.browser import do, wait_until_loaded
 from tetra_drake.lab.films.video import encode, make_video
 from tetra_drake.laws.terrain import Incline
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile

@@ -41,7 +41,8 @@ from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.equilibrium import Unactuated, damping_at_rest, mass_matrix
-from tetra_drake.robot.gait import GivenGait, given_gait, with_body
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot

@@ -12,7 +12,7 @@ from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.on_demand import loaded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import driven_robot
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.world import World

@@ -14,7 +14,8 @@ from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, Driver, driven_robot
-from tetra_drake.robot.gait import GivenGait, given_gait, seeded_gait
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.steering import SteeringSignal, constant_steering
 from tetra_drake.scenario.load import GivenScenario, given_scenario

@@ -28,7 +28,8 @@ from tetra_drake.errors import (
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, ParameterSpace, with_body
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import ParameterSpace, with_body
 from tetra_drake.scenario.disturbances import draws_of_iteration
 from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario

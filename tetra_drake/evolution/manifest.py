@@ -40,10 +40,11 @@ from tetra_drake.files import (
     read_text,
     write_whole,
 )
-from tetra_drake.laws.height_files import RECORDED
+from tetra_drake.laws.height_field import RECORDED
 from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Task
-from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.plugins import check_plugins, plugins_of

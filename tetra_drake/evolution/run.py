@@ -29,7 +29,9 @@ from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path
 from tetra_drake.formatting import Say, TextTable, heading_html, rounded, silent
 from tetra_drake.results.result import headline
-from tetra_drake.robot.gait import Gait, ParameterSpace, Vector, load_gait, with_body
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector, with_body
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS, MetricRanges
 from tetra_drake.scenario.scenario import Scenario

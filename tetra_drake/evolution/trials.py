@@ -36,7 +36,8 @@ from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.files import write_whole
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
-from tetra_drake.robot.gait import ParameterSpace, save_gait, with_body
+from tetra_drake.robot.gait_file import save_gait
+from tetra_drake.robot.parameter_space import ParameterSpace, with_body
 from tetra_drake.settings.units import INCHES, Units
 
 _SHOW_PERIOD = 1.0  # s

@@ -16,7 +16,7 @@ from tetra_drake.evolution.entries import SPREADS, SpreadLine
 from tetra_drake.evolution.run import load_run
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import GivenGait, given_gait
+from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS

@@ -4,7 +4,7 @@ A kind is a section of settings that derives from CpgKind, with two functions fo
 of its states, and its outputs. To add a kind, write one file such as laws.phase, with settings,
 parameters(), constants(), starting_state() and an OscillatorFunctions. All engines, the diagram's
 LeafSystem and searches take everything from there. A plug-in names the class by an entry point; the
-package's own kinds are in scenario.world.Cpg.
+package's own kinds are in scenario.world.
 
 Each oscillator has two inputs, which are tonic input plus feedback. A Matsuoka oscillator has two
 neurons for them. Feedback with opposite signs on both shifts or entrains the oscillator; feedback

@@ -31,7 +31,7 @@ from tetra_drake.laws.oscillator import (
     OscillatorFunctions,
     Wiring,
 )
-from tetra_drake.settings.quantities import Angle, Frequency, Rate, Time
+from tetra_drake.settings.quantities import Angle, Frequency, InverseTime, Time
 from tetra_drake.settings.refusals import refuse
 
 PAIR = Field(min_length=2, max_length=2)
@@ -80,7 +80,7 @@ def phase_outputs(states: Table, outputs: Table, law: PhaseConstants) -> None:
         outputs[k] = states[outputs.size + k, VALUE] * sine(states[k, VALUE] + 0.5 * math.pi)
 
 
-class Phase(CpgKind):
+class PhaseOscillators(CpgKind):
     """Settings of phase oscillators with controlled amplitudes. Frequency, amplitudes, lags and
     coupling are parameters of a gait; here are their bounds in random gaits, and equal bounds fix
     them. With fixed amplitudes, common lags and a fixed coupling, a gait is a travelling sine.
@@ -89,6 +89,7 @@ class Phase(CpgKind):
     through 0 at the start-up time.
     """
 
+    tag = "Phase"
     own = OscillatorFunctions(PhaseConstants, phase_rates, phase_outputs)
 
     start_up: Time = Field(default=1.25, ge=0)
@@ -100,16 +101,16 @@ class Phase(CpgKind):
     """Bounds of the amplitudes; `gain` is the signal per unit."""
     lag: Annotated[list[Angle], PAIR] = Field(default=[-math.pi, math.pi])
     """Bounds of the phase by which an oscillator is behind the one before it."""
-    coupling: Annotated[list[Annotated[Rate, Field(ge=0)]], PAIR] = Field(default=[8.0, 8.0])
+    coupling: Annotated[list[Annotated[InverseTime, Field(ge=0)]], PAIR] = Field(default=[8.0, 8.0])
     """Bounds of the coupling w of neighbours. A phase that is displaced by a little comes back at a
     rate of about w."""
     common: list[Literal["amplitude", "lag"]] = Field(default=[])
     """Parameters that random and evolved gaits have in common for all oscillators."""
-    settling: Rate = Field(default=20.0, gt=0)
+    settling: InverseTime = Field(default=20.0, gt=0)
     """Rate at which amplitudes settle."""
 
     @model_validator(mode="after")
-    def _check_bounds(self) -> Phase:
+    def _check_bounds(self) -> PhaseOscillators:
         for name in ("frequency", "amplitude", "lag", "coupling"):
             low, high = getattr(self, name)
             if low > high:

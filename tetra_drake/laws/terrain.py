@@ -42,7 +42,6 @@ from tetra_drake.kernels.lanes import (
     minimum,
     select,
 )
-from tetra_drake.laws.height_files import HeightFile, HeightPath
 from tetra_drake.laws.kinematics import P_WN
 from tetra_drake.laws.vectors import Vector3, put_vector, vector_at
 from tetra_drake.settings.quantities import Angle, Length
@@ -385,16 +384,11 @@ class Relief(Section):
 
     @property
     def paths(self) -> dict[str, str]:
-        """Paths of the height files that these settings name; the keys are the names of the
-        settings."""
-        return {key: file.path for key, file in self if isinstance(file, HeightFile)}
+        """Paths of the files that these settings name, by the names of the settings."""
+        return {}
 
     def save(self, folder: Path) -> None:
-        """Copies the terrain's height files, if it has any, to the folder of a record. A copy is
-        named heights-DIGEST.npy, by a digest of the heights."""
-        for _, file in self:
-            if isinstance(file, HeightFile):
-                file.save(folder)
+        """Copies the terrain's files, if it has any, to the folder of a record."""
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         """Heights of the terrain on a grid.
@@ -548,28 +542,9 @@ class Obstacles(Relief):
         return Grid(heights, (x[0, 0], y[0, 0]), (cell, cell))
 
 
-class HeightField(Relief):
-    """Heights in m from a file. Rows are along x and columns along y, in ascending order.
-
-    The grid's centre is the origin. The file is numpy's `.npy`, or text of numbers separated by
-    blanks or commas. It has at least 3 x 3 and at most 4 million heights. A relative path starts in
-    the folder of the scenario file that names it. A record keeps a copy of the file, named by a
-    digest of the heights.
-    """
-
-    file: HeightPath
-    """File of heights in m."""
-    cell: Length = Field(gt=0)
-    """Distance between neighbours, along x and y."""
-
-    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
-        heights = self.file.heights
-        x, y = (-0.5 * (size - 1) * self.cell for size in heights.shape)
-        return Grid(heights, (x, y), (self.cell, self.cell))
-
-
 Terrain = Annotated[
-    Flat | Nothing | Incline | Steps | Rough | Obstacles | HeightField, Kinds(Relief)
+    Flat | Nothing | Incline | Steps | Rough | Obstacles,
+    Kinds(Relief, more=["tetra_drake.laws.height_field:HeightField"]),
 ]
 
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario.disturbances import IterationSeed
 from tetra_drake.scenario.experiment_sections import EvolutionSection
 

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.generational import MIDDLE, Box, Generational, Matrix, Ranges
-from tetra_drake.robot.gait import Vector
+from tetra_drake.robot.parameter_space import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
 
 TRYOUT = 1000

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.base import Evaluation, Iteration, mean_fitness
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario.experiment_sections import EvolutionSection
 
 Matrix = npt.NDArray[np.float64]

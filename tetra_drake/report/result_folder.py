@@ -35,7 +35,7 @@ from tetra_drake.formatting import Say, silent
 from tetra_drake.machine import versions
 from tetra_drake.results.result import IntegratorWork, SimulationResult
 from tetra_drake.results.trajectory import VARIABLES, labels, save_dataset, with_indexes
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.measures import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure

@@ -46,7 +46,8 @@ from tetra_drake.on_demand import loaded
 from tetra_drake.report import summary
 from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
 from tetra_drake.results.result import SimulationResult, headline
-from tetra_drake.robot.gait import Gait, load_gait, save_gait
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import load_gait, save_gait
 from tetra_drake.robot.remarks import stillness_remark
 from tetra_drake.scenario import metrics
 from tetra_drake.scenario.load import SCENARIO, load_scenario

@@ -13,7 +13,8 @@ import numpy as np
 
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.gait import Gait, check_parameters, with_body
+from tetra_drake.robot.gait import Gait, check_parameters
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot, Pilot

@@ -16,6 +16,7 @@ from tetra_drake.files import json_number
 from tetra_drake.formatting import TextTable
 from tetra_drake.laws.curves import curvature, travelling_index
 from tetra_drake.laws.tally import Metric, TalliedMetrics, Tally, metric
+from tetra_drake.scenario.robot_settings import ROW
 from tetra_drake.settings.units import INCH, INCHES, Units, current
 
 STRAIGHT = 0.01
@@ -24,8 +25,6 @@ thesis, then deviates from a line by less than a fifth of a millimetre."""
 
 LEAST_WAY = 1e-3
 """Least distance (m) for the cost of transport; a shorter one counts as this distance."""
-ROW = "row of tetrahedra"
-"""Name of a property of robots that some metrics need."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,11 @@ from typing import ClassVar
 import pydantic
 
 from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.tolerances import split_tolerances
 from tetra_drake.settings.section import Section, Tree
+
+ROW = "row of tetrahedra"
+"""Property that metrics of the thesis's robot need."""
 
 
 class RobotSettings(Section):

@@ -120,7 +120,8 @@ class Scenario(World):
         is empty exactly if the scenarios are equal, apart from their names.
         """
         ours, theirs = self.values(), base.values()
-        kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs.get(key)]
+        tags = [key for key in {**ours, **theirs} if key.endswith(f".{TAG}")]
+        kinds = [key for key in tags if ours.get(key) != theirs.get(key)]
         other_kinds = tuple(key.removesuffix(TAG) for key in kinds)
         found = []
         for key in dict.fromkeys([*ours, *theirs]):
@@ -183,6 +184,8 @@ class Scenario(World):
         if bounds.turn != 0.0 and not blueprint.sides.any():
             expected = "expected 0, as no group is on one side"
             refuse("gait_bounds.turn", f"found {bounds.turn}, {expected}")
+        if bounds.mirrored and not self.cpg.mirrors:
+            refuse("gait_bounds.mirrored", f"found true, expected false for !{self.cpg.tag}")
         if bounds.mirrored and None in blueprint.images:
             oscillator = blueprint.oscillators[blueprint.images.index(None)]
             expected = f"expected false, as '{oscillator}' has no mirror image"

@@ -16,9 +16,7 @@ from tetra_drake.laws.actuator import Actuation, Force
 from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
-from tetra_drake.laws.matsuoka import Matsuoka
 from tetra_drake.laws.oscillator import CpgKind, GaitBounds, GaitParameter
-from tetra_drake.laws.phase import Phase
 from tetra_drake.laws.terrain import Flat, Terrain
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
@@ -43,7 +41,8 @@ MOST_SAMPLES = 2_000_000
 """Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
 
 
-Cpg = Annotated[Matsuoka | Phase, Kinds(CpgKind, plain=True)]
+_CPGS = ["tetra_drake.laws.matsuoka:Matsuoka", "tetra_drake.laws.phase:PhaseOscillators"]
+Cpg = Annotated[CpgKind, Kinds(CpgKind, more=_CPGS, plain=True)]
 """Oscillators of any kind, with their settings. A mapping without a tag is a !Matsuoka, and written
 so."""
 

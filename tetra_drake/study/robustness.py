@@ -35,7 +35,9 @@ from tetra_drake.figures.style import (
 from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
 from tetra_drake.machine import versions
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, GivenGait, given_gait, with_body
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
 from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import GivenScenario, given_scenario

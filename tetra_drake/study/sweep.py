@@ -12,7 +12,8 @@ import numpy as np
 
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.robot.gait import GivenGait, given_gait, with_body
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.scenario.changes import given_changes
 from tetra_drake.scenario.joined_keys import different_keys, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario

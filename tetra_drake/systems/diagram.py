@@ -28,10 +28,10 @@ from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.attachment import Attach
 from tetra_drake.systems.cable_network import AddCables, Cable
-from tetra_drake.systems.cpg import Cpg
 from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import AddGroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
+from tetra_drake.systems.oscillator_cpg import OscillatorCpg
 from tetra_drake.systems.start_up_gate import StartUpGate
 from tetra_drake.systems.state_forces import StateForces
 from tetra_drake.systems.steering import Steering
@@ -69,7 +69,7 @@ def MakeTensegrityDiagram(
     Subsystems:
 
     - cpg: only with a gait. With `cpg.signals: live` in the scenario, it is the network, integrated
-      with the robot (a live network): a MatsuokaCpg, or a Cpg for other kinds of oscillators.
+      with the robot (a live network): a MatsuokaCpg, or an OscillatorCpg for other kinds.
       Otherwise it is the network's signals, computed beforehand. A robot without oscillators has no
       cpg.
     - steering: only for a live network with oscillators on the left or right
@@ -345,10 +345,12 @@ def _AddSignals(
             "initial_state": robot.starting_oscillators(gait),
             "gain": cpg.gain,
         }
-        is_matsuoka = network.own is Matsuoka.own
-        oscillators = builder.AddNamedSystem(
-            "cpg", MatsuokaCpg(network.constants, **given) if is_matsuoka else Cpg(network, **given)
-        )
+        made: OscillatorCpg
+        if network.own is Matsuoka.own:
+            made = MatsuokaCpg(network.constants, **given)
+        else:
+            made = OscillatorCpg(network, **given)
+        oscillators = builder.AddNamedSystem("cpg", made)
         if robot.structure.sides.any():
             turn = gait.turn if steering is None else steering
             steers = builder.AddNamedSystem("steering", Steering(robot.tonic_input, turn=turn))

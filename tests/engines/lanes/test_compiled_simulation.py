@@ -8,7 +8,7 @@ from helpers.converged import shortly
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
 from tetra_drake.errors import Diverged, StepBudgetExceeded
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import make_model
 from tetra_drake.scenario.scenario import Scenario
 

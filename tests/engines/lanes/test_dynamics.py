@@ -16,7 +16,7 @@ from tetra_drake.laws.kinematics import move_bodies
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.terrain import Flat, Rough
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario

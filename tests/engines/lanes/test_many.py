@@ -29,7 +29,7 @@ from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws

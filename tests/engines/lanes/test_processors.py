@@ -17,7 +17,7 @@ WITHOUT_AVX512 = {"NPY_DISABLE_CPU_FEATURES": "X86_V4", "OPENBLAS_CORETYPE": "Ha
 
 WALKS = """
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.shipped import shipped_scenarios
 for name in shipped_scenarios():

@@ -35,7 +35,7 @@ from tetra_drake.laws.terrain import SurfaceGrid
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.command import driven_robot
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.readings import Readings, bodies_state
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot

@@ -27,7 +27,7 @@ from tetra_drake.laws.model import WORLD
 from tetra_drake.robot.command import Command, Driver
 from tetra_drake.robot.command_file import TIME_S, column_numbers, load_command, table_cells
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.joined_keys import different_keys

@@ -40,7 +40,8 @@ from tetra_drake.lab.predict.variates import Variate, variates_of
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, Driver
-from tetra_drake.robot.gait import GivenGait, given_gait, with_body
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.remarks import yielding_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import stream

@@ -21,7 +21,8 @@ from tetra_drake.laws.cable import CableLaw
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.command_file import command_text, load_command, table_text
-from tetra_drake.robot.gait import GivenGait, given_gait, with_body
+from tetra_drake.robot.gait_file import GivenGait, given_gait
+from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.remarks import stillness_remark
 from tetra_drake.robot.structure import length_rates
 from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario

@@ -12,7 +12,7 @@ from tetra_drake.laws.oscillator import Oscillators, make_states, state_rates, s
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
-class Cpg(ConvertibleSystem):
+class OscillatorCpg(ConvertibleSystem):
     """Network of n oscillators of any kind, such as phase oscillators.
 
     | port     | in, out | shape | unit | meaning                                               |
