@@ -141,13 +141,13 @@ class CpgKind(Section):
     """True if gaits can be the same on the left and on the right (`gait_bounds.mirrored`)."""
     gain: ForceQuantity
     """Signal (a force) of an oscillator per unit of its output."""
-    start_up: Time = Field(ge=0)
+    start_up: Time = Field(default=1.25, ge=0)
     """Time until which the cables are not actuated."""
-    signals: Literal["listing", "live"]
+    signals: Literal["listing", "live"] = "live"
     """How the signals are computed. `listing`: before the simulation, by forward Euler, as in the
     thesis's listing. `live`: the network is integrated together with the robot. Feedback needs
     `live`."""
-    listing_step: Time = Field(ge=1e-6)
+    listing_step: Time = Field(default=5e-4, ge=1e-6)
     """Time step of signals that are computed beforehand."""
     feedback: list[Pathway] = Field(default=[])
     """Pathways of feedback; their gains are parameters of the gait."""

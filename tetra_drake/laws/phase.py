@@ -31,7 +31,7 @@ from tetra_drake.laws.oscillator import (
     OscillatorFunctions,
     Wiring,
 )
-from tetra_drake.settings.quantities import Angle, Frequency, InverseTime, Time
+from tetra_drake.settings.quantities import Angle, Frequency, InverseTime
 from tetra_drake.settings.refusals import refuse
 
 PAIR = Field(min_length=2, max_length=2)
@@ -92,9 +92,6 @@ class PhaseOscillators(CpgKind):
     tag = "Phase"
     own = OscillatorFunctions(PhaseConstants, phase_rates, phase_outputs)
 
-    start_up: Time = Field(default=1.25, ge=0)
-    signals: Literal["listing", "live"] = "live"
-    listing_step: Time = Field(default=5e-4, ge=1e-6)
     frequency: Annotated[list[Annotated[Frequency, Field(ge=0)]], PAIR] = Field(default=[0.3, 1.2])
     """Bounds of the frequency of all oscillators."""
     amplitude: Annotated[list[Annotated[float, Field(ge=0)]], PAIR] = Field(default=[0.5, 1.0])
