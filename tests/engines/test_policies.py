@@ -182,7 +182,7 @@ def test_a_policy_of_ones_own_is_found_by_its_import_path():
         (f"!Python {{function: '{__name__}:undefined', count: 1}}", "undefined: returned a number"),
         ("!Linear {readings: [lengths, smells]}", "smells"),
         ("!Linear {readings: [lengths, lengths]}", "policy.readings: found"),
-        ("!Python {function: 'm:f', count: 1, bounds: [1, 0]}", "policy.bounds: found 1.0 and"),
+        ("!Python {function: 'm:f', count: 1, bounds: [1, 0]}", "policy.bounds: found 1 to 0"),
     ],
 )
 def test_a_wrong_policy_is_refused(policy, expected):

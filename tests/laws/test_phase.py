@@ -26,8 +26,10 @@ def motion(states, *, lag=(0.0, 0.0), coupling=0.0, amplitude=1.0, settling=20.0
         coupling=np.array([0.0, coupling])[:count],
         settling=np.full(count, settling),
     )
-    table = make_states(np.array(states, dtype=float))
-    parts, found = Packed((Oscillators(PhaseOscillators.own, law), table)), [table[:, 0].copy()]
+    start = np.array(states, dtype=float)
+    oscillators = Oscillators(PhaseOscillators.own, law, start, gains=np.zeros(3))
+    table = make_states(oscillators)
+    parts, found = Packed((oscillators, table)), [start]
     for row in np.ones((2000, 2 * count)) if inputs is None else inputs:
         write_outputs(parts, row[np.newaxis], STEP, False, np.empty((1, count)))
         found.append(table[:, 0].copy())

@@ -119,8 +119,8 @@ def _piloted_robot(robot: Robot, gait: Gait, policy: PolicyKind) -> DrivenRobot:
     """A robot driven by its scenario's policy with the parameters of a gait, whose first signals
     act from the start on. Raises InputError if the gait has other parameters."""
     scenario, step = robot.scenario, robot.scenario.cpg.listing_step
-    source, own = f"gait {gait.name}", scenario.parameters
-    given = check_parameters(gait.parameters, own, source=source, key="parameters")
+    own = policy.gait_parameters(robot.structure)
+    given = check_parameters(gait.parameters, own, f"gait {gait.name}", "parameters")
     values = np.array([*given.values()], dtype=float)
     controlled, structure = robot.controlled, robot.structure
     cables, struts = robot.starting_cables(), structure.p_WN[structure.struts]

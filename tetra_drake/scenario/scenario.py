@@ -158,8 +158,11 @@ class Scenario(World):
 
     @functools.cached_property
     def parameters(self) -> Mapping[str, GaitParameter]:
-        """Parameters of a gait by name, with the bounds of `gait_bounds`; see World.parameters."""
-        return self.parameters_within(self.gait_bounds)
+        """Parameters of a gait by name: of the policy if there is one, otherwise of the
+        oscillators."""
+        if self.policy is not None:
+            return self.policy.gait_parameters(self.blueprint())
+        return self.cpg.parameters(self.blueprint(), self.gait_bounds)
 
     _split = model_validator(mode="before")(split_tolerances)
     _check_known = model_validator(mode="after")(check_tolerances)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import NoneType
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +21,7 @@ from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.matsuoka import Matsuoka
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import gains_of, signal_samples
+from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake
@@ -175,7 +174,8 @@ def MakeTensegrityDiagram(
         actuators = builder.GetSubsystemByName("cables_actuators")
         builder.ExportOutput(actuators.get_output_port(), "drives")
     if builder.HasSubsystemNamed("cpg") and scenario.cpg.feedback:
-        feedback = Feedback(robot, gains=gains_of(gait))
+        assert gait is not None
+        feedback = Feedback(robot, gains=robot.oscillators(gait).gains)
         _AddFeedback(builder, feedback, state, signals, ground)
 
     builder.ExportOutput(state, "state")
@@ -340,16 +340,10 @@ def _AddSignals(
     if cpg.signals == "live":
         robot.turns(gait, steering)  # raises InputError for a wrong turn
         network = robot.oscillators(gait)
-        given: dict[str, Any] = {
-            "tonic": np.full(2 * size, cpg.tonic),
-            "initial_state": robot.starting_oscillators(gait),
-            "gain": cpg.gain,
-        }
-        made: OscillatorCpg
+        tonic, start = np.full(2 * size, cpg.tonic), network.start
+        made = OscillatorCpg(network, tonic=tonic, gain=cpg.gain)
         if network.own is Matsuoka.own:
-            made = MatsuokaCpg(network.constants, **given)
-        else:
-            made = OscillatorCpg(network, **given)
+            made = MatsuokaCpg(network.constants, tonic=tonic, initial_state=start, gain=cpg.gain)
         oscillators = builder.AddNamedSystem("cpg", made)
         if robot.structure.sides.any():
             turn = gait.turn if steering is None else steering

@@ -44,8 +44,9 @@ class MatsuokaCpg(OscillatorCpg):
             expected = f"({2 * neurons},) for {neurons} neurons"
             raise ValueError(f"found initial_state of shape {shape}, expected {expected}")
         inputs = np.full(neurons, tonic, dtype=float)
-        oscillators = Oscillators(Matsuoka.own, network)
-        super().__init__(oscillators, tonic=inputs, initial_state=initial_state, gain=gain)
+        start = np.array(initial_state, dtype=float)
+        oscillators = Oscillators(Matsuoka.own, network, start, gains=np.zeros(0))
+        super().__init__(oscillators, tonic=inputs, gain=gain)
         DeclareOutput(self, "neurons", neurons, MatsuokaCpg._outputs, {self.xc_ticket()})
 
     def _outputs(self, context: Context) -> np.ndarray:

@@ -70,12 +70,10 @@ class Hopf(CpgKind):
         frequency = GaitParameter(0.3, 1.2, floor=0.0, least=0.0, unit="Hz")
         return {"frequency": frequency, **lags, **self.gain_parameters()}
 
-    def constants(self, wiring, gait):
+    def network(self, wiring, gait):
         count = wiring.signals
         lags = np.array([gait.get(f"lag {k + 1}", 0.0) for k in range(count)])
         frequency = np.full(count, math.tau * gait["frequency"])
         growth, pull = np.full(count, self.growth), np.full(count, self.pull)
-        return HopfConstants(frequency, growth, pull, np.cos(lags), np.sin(lags))
-
-    def starting_state(self, wiring, gait):
-        return np.repeat([1.0, 0.0], wiring.signals)
+        constants = HopfConstants(frequency, growth, pull, np.cos(lags), np.sin(lags))
+        return constants, np.repeat([1.0, 0.0], count)
