@@ -200,7 +200,7 @@ def test_what_does_not_go_with_a_policy_is_refused(tmp_path):
             scenario.with_changes({key: value, "cpg.signals": "live"})
     with pytest.raises(InputError, match="unknown names, such as 'weight"):
         simulate(scenario, gait)
-    with pytest.raises(InputError, match="lacks 25 names"):
+    with pytest.raises(InputError, match="lacks 26 names"):
         simulate(thesis, values)
     with pytest.raises(InputError, match="steering"):
         simulate(scenario, values, steering=0.5)

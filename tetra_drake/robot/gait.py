@@ -85,8 +85,10 @@ def check_parameters(
             raise InputError(source, place, f"found {value}, expected {limit}")
         else:
             values[name] = value
-    problems = {"lacks": missing, "has unknown": [name for name in given if name not in expected]}
-    if texts := [f"{x} {len(some)}, such as '{some[0]}'" for x, some in problems.items() if some]:
+    unknown = [name for name in given if name not in expected]
+    problems = {"lacks {} names": missing, "has {} unknown names": unknown}.items()
+    texts = [f"{text.format(len(some))}, such as '{some[0]}'" for text, some in problems if some]
+    if texts:
         found = f"found {len(given)}, expected the {len(expected)} of the scenario"
         raise InputError(source, key, f"{found}; {' and '.join(texts)}")
     return values
