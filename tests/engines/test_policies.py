@@ -184,7 +184,7 @@ def test_a_policy_of_ones_own_is_found_by_its_import_path():
         ),
         ("!Linear {readings: [lengths, smells]}", "smells"),
         ("!Linear {readings: [lengths, lengths]}", "policy.readings: found"),
-        ("!Python {function: 'm:f', count: 1, bounds: [1, 0]}", "policy.bounds: found 1.0 and"),
+        ("!Python {function: 'm:f', count: 1, bounds: [1, 0]}", "policy.bounds: found 1 to 0"),
     ],
 )
 def test_a_wrong_policy_is_refused(policy, expected):
@@ -202,7 +202,7 @@ def test_what_does_not_go_with_a_policy_is_refused(tmp_path):
             scenario.with_changes({key: value, "cpg.signals": "live"})
     with pytest.raises(InputError, match="unknown names, such as 'weight"):
         simulate(scenario, gait)
-    with pytest.raises(InputError, match="lacks 25 names"):
+    with pytest.raises(InputError, match="lacks 26 names"):
         simulate(thesis, values)
     with pytest.raises(InputError, match="steering"):
         simulate(scenario, values, steering=0.5)

@@ -1,12 +1,14 @@
 """Plug-ins: what they add, and one line for each that is damaged or missing."""
 
 import json
+import math
 import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import pytest
 from helpers.plugin import declare, install_example
 
@@ -26,13 +28,14 @@ robot: !Scaled {factor: 1.2}
 friction: !Viscous {damping: 5 N*s/m}
 terrain: !Waves {height: 2 mm, wavelength: 30 cm}
 actuation: !Servo {max_force: 20 N, max_speed: 0.2 m/s}
+cpg: !Hopf {gain: 1 N, start_up: 0 s}
 policy: !Sine {}
 optimizer: !HillClimb {step: 0.2}
 engine: !Drake {}
 simulation: {duration: 4 ms, steady_from: 1 ms, sample_period: 1 ms}
 evolution: {trials: 1, evaluations: 2}
 """
-TAGS = ["Scaled", "Viscous", "Waves", "Servo", "Sine", "HillClimb"]
+TAGS = ["Scaled", "Viscous", "Waves", "Servo", "Hopf", "Sine", "HillClimb"]
 
 USE = """\
 import json, pickle, sys
@@ -200,14 +203,43 @@ def test_plugins_are_not_searched_by_an_import(used):
     assert used[1]["searches by imports"] == 0
 
 
+OSCILLATE = """\
+import json, sys
+import numpy as np
+import tetra_drake as td
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
+
+if __name__ == "__main__":
+    scenario = td.load_scenario(sys.argv[1]).with_changes({"policy": None})
+    gait = td.seeded_gait(scenario)
+    walk = td.simulate(scenario, gait, record=True).trajectory
+    longer = scenario.with_changes({"simulation.duration": "2 s", "simulation.steady_from": "1 s"})
+    signals = DrivenRobot.of(Robot.of(longer), gait).signals_at(np.array([1.8, 1.9]))
+    print(json.dumps([dict(gait.parameters), walk.signal.values.tolist(), signals.tolist()]))
+"""
+
+
+def test_oscillators_of_a_plugin_drive_a_robot_in_the_diagram(tmp_path):
+    install_example(tmp_path / "site")
+    gait, walk, late = run_with(tmp_path / "site", tmp_path, OSCILLATE)
+    turn = math.tau * gait["frequency"]
+    np.testing.assert_allclose(walk[0], 1.0, atol=1e-12)  # all begin at x = 1, y = 0
+    lags = np.cumsum([0.0, *(gait[name] for name in gait if name.startswith("lag"))])
+    for time, signals in zip((1.8, 1.9), late, strict=True):
+        np.testing.assert_allclose(signals, np.cos(turn * time - lags), atol=0.05)
+
+
 COMPARE = """\
 import json, sys
 import tetra_drake as td
 
 if __name__ == "__main__":
     scenario = td.load_scenario(sys.argv[1]).with_changes({"simulation.duration": "0.5 s"})
-    gait = td.seeded_gait(scenario)
-    results = [td.simulate(scenario.on_engine(name), gait) for name in ("drake", "compiled")]
+    results = []
+    for each in (scenario, scenario.with_changes({"policy": None})):
+        gait = td.seeded_gait(each)
+        results += [td.simulate(each.on_engine(name), gait) for name in ("drake", "compiled")]
     run = td.evolve(td.load_scenario(sys.argv[1]), "run", workers=1, report=False)
     metrics = [result.metrics.to_json() for result in results]
     print(json.dumps([*metrics, len(run.evaluations)]))
@@ -217,7 +249,8 @@ if __name__ == "__main__":
 @pytest.mark.slow
 def test_laws_of_a_plugin_are_compiled_for_every_engine(tmp_path):
     install_example(tmp_path / "site")
-    drake, lanes, evaluations = run_with(tmp_path / "site", tmp_path, COMPARE, jit=True)
+    *walks, evaluations = run_with(tmp_path / "site", tmp_path, COMPARE, jit=True)
     assert evaluations == 2, "in a worker process"
-    for name in ("distance", "tension", "peak_actuator_force"):
-        assert lanes[name] == pytest.approx(drake[name], rel=0.02), name
+    for drake, lanes in (walks[:2], walks[2:]):  # of a policy, of oscillators
+        for name in ("distance", "tension", "peak_actuator_force"):
+            assert lanes[name] == pytest.approx(drake[name], rel=0.02), name

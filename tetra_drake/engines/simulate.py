@@ -155,7 +155,5 @@ def check_scenario(scenario: Scenario) -> None:
         problem = "found no oscillator, expected at least one that drives cables"
         raise InputError(scenario.name, "robot.actuated", problem)
     robot, gait = Robot.of(scenario), seeded_gait(scenario)
-    driven = driven_robot(scenario, gait, robot=robot)
-    if driven.oscillating is not None:
-        robot.oscillators(driven.oscillating)
+    driven_robot(scenario, gait, robot=robot).oscillators  # noqa: B018
     engine_of(scenario).check(scenario)

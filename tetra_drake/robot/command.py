@@ -89,8 +89,8 @@ def driven_robot(
             return DrivenRobot.of(robot, driver, steering=steering)
         if steering is not None:
             raise InputError("steering", "", f"found a function, and {driver.name} is for a policy")
-        source, own = f"gait {driver.name}", scenario.parameters
-        given = check_parameters(driver.parameters, own, source=source, key="parameters")
+        own = scenario.policy.gait_parameters(robot.structure)
+        given = check_parameters(driver.parameters, own, f"gait {driver.name}", "parameters")
         values, step = np.array([*given.values()], dtype=float), scenario.cpg.listing_step
         period = step * round(scenario.simulation.control_period / step)
         return _looped(robot, scenario.policy.signals, values, period, gait=driver)

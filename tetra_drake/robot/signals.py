@@ -18,8 +18,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
 from tetra_drake.kernels.packed import Packed
-from tetra_drake.laws.feedback import PATHWAYS
-from tetra_drake.laws.matsuoka import NO_NETWORK, Matsuoka
+from tetra_drake.laws.matsuoka import NO_OSCILLATORS
 from tetra_drake.laws.oscillator import Oscillators, make_states, write_outputs
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
@@ -168,21 +167,7 @@ class DrivenRobot:
     @property
     def oscillators(self) -> Oscillators:
         """Oscillators that make the signals; none if they are given."""
-        if self.oscillating is not None:
-            return self.robot.oscillators(self.oscillating)
-        return Oscillators(Matsuoka.own, NO_NETWORK)
-
-    @property
-    def starting_state(self) -> np.ndarray:
-        """States (s,) of the oscillators at t = 0; none if the signals are given."""
-        gait = self.oscillating
-        return self.robot.starting_oscillators(gait) if gait else np.zeros(0)
-
-    @property
-    def gains(self) -> np.ndarray:
-        """Gains of the network's feedback, one for each pathway in the order of
-        laws.feedback.PATHWAYS; zeros without feedback or network."""
-        return gains_of(self.oscillating)
+        return self.robot.oscillators(self.oscillating) if self.oscillating else NO_OSCILLATORS
 
     @property
     def turns(self) -> np.ndarray:
@@ -191,12 +176,6 @@ class DrivenRobot:
         without a gait."""
         gait = self.oscillating
         return self.robot.turns(gait, self.steering) if gait else np.zeros(1)
-
-
-def gains_of(gait: Gait | None) -> np.ndarray:
-    """Gains of a gait's feedback, one for each pathway in the order of laws.feedback.PATHWAYS."""
-    parameters = gait.parameters if gait else {}
-    return np.array([parameters.get(f"gain {name}", 0.0) for name in PATHWAYS])
 
 
 def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
@@ -215,15 +194,15 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
     Raises InputError if the gait does not fit. Raises InputError for a gait with feedback, because
     its signals depend on the robot's motion.
     """
-    cpg, oscillators = robot.scenario.cpg, robot.structure.signals
-    if gains_of(gait).any():
+    cpg, oscillators = robot.scenario.cpg, robot.oscillators(gait)
+    if oscillators.gains.any():
         problem = "has feedback; its signals exist only while the robot is simulated"
         raise InputError(f"gait {gait.name}", "gains", problem)
     turns = robot.turns(gait, steering)
     midway = 0.5 * (turns[:-1] + turns[1:]) if turns.size > 1 else turns
     inputs = robot.tonic_input(midway)
-    parts = Packed((robot.oscillators(gait), make_states(robot.starting_oscillators(gait))))
-    output = np.empty((DrivenRobot.of(robot, gait).sample_count, oscillators))
+    parts = Packed((oscillators, make_states(oscillators)))
+    output = np.empty((DrivenRobot.of(robot, gait).sample_count, robot.structure.signals))
     write_outputs(parts, inputs, cpg.listing_step, cpg.signals == "listing", output)
     return cpg.gain * np.vstack([output, output[-1:], output[-1:]])
 

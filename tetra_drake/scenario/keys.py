@@ -96,7 +96,7 @@ def _list_of_keys(rows: Iterable[tuple[str, Tree]], told: dict[str, str], kind: 
     key, each with its kind; equal ones are not repeated."""
     lines, again = [], dict[str, list[str]]()
     for key, node in rows:
-        default = json.dumps(node["default"]).strip('"') if "default" in node else ""
+        default = json.dumps(node["default"]).replace('"', "") if "default" in node else ""
         if default in ("null", "[]", "{}"):
             default = "optional"
         elif default:

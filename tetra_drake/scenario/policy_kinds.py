@@ -8,7 +8,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Mapping
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 from tetra_drake.errors import InputError, checked_numbers
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.policies import DrivenRobots, PolicyBounds, PolicyKind, driven_names
-from tetra_drake.settings.quantities import Time
+from tetra_drake.settings.quantities import PAIR, Time
 from tetra_drake.settings.refusals import refuse
 
 MOST_PARAMETERS = 100_000
@@ -163,15 +163,8 @@ class PythonPolicy(PolicyKind):
     are found."""
     count: int = Field(ge=1, le=MOST_PARAMETERS)
     """Number of parameters."""
-    bounds: list[float] = Field(default=[-1.0, 1.0], min_length=2, max_length=2)
+    bounds: Annotated[list[float], *PAIR] = Field(default=[-1.0, 1.0])
     """Least and greatest parameter in random policies."""
-
-    @model_validator(mode="after")
-    def _check_bounds(self) -> PythonPolicy:
-        low, high = self.bounds
-        if low >= high:
-            refuse("bounds", f"found {low} and {high}, expected the least one first")
-        return self
 
     def parameters(self, blueprint: Blueprint) -> Mapping[str, PolicyBounds]:
         low, high = self.bounds

@@ -12,7 +12,7 @@ from tetra_drake.laws.oscillator import Oscillators, make_states, state_rates, s
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
-class Cpg(ConvertibleSystem):
+class OscillatorCpg(ConvertibleSystem):
     """Network of n oscillators of any kind, such as phase oscillators.
 
     | port     | in, out | shape | unit | meaning                                               |
@@ -32,16 +32,15 @@ class Cpg(ConvertibleSystem):
         oscillators: Oscillators,
         *,
         tonic: npt.ArrayLike,
-        initial_state: npt.ArrayLike,
         gain: float = 1.0,
     ) -> None:
-        """`tonic` (2n,) is the input without a connected port, `initial_state` (s,) the states at
-        t = 0, `gain` the force (N) per unit of output."""
+        """`tonic` (2n,) is the input without a connected port, `gain` the force (N) per unit of
+        output."""
         super().__init__()
-        state, self._default_tonic = np.array(initial_state, dtype=float), np.array(tonic, float)
+        state, self._default_tonic = oscillators.start, np.array(tonic, dtype=float)
         self._gain, inputs = float(gain), self._default_tonic.size
         # The kernel writes to these arrays at every call.
-        self._parts, self._rates = Packed((oscillators, make_states(state))), state.copy()
+        self._parts, self._rates = Packed((oscillators, make_states(oscillators))), state.copy()
         self._compute_rates = machine_code(
             state_rates, self._parts, state, self._default_tonic, self._rates
         )
