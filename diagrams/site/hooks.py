@@ -35,7 +35,7 @@ from cells import read_cells  # noqa: E402
 TUTORIALS = "diagrams/tutorials"
 RUNS = ROOT / "out/tutorials"
 """What tutorials print and draw, kept for the next build with the same sources."""
-PACKAGE, STUB = "tetra_drake", "tetra_drake/__init__.pyi"
+PACKAGE = "tetra_drake"
 BESIDE = "runs/meshcat.js"
 """What replays load."""
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".cff": "yaml"}
@@ -181,13 +181,11 @@ def folder_page(folder: Path) -> str:
 
 
 def api_page(module: str) -> str:
-    """Page of the names that a module exports, from the imports in its stub or in itself."""
-    stub = ROOT / STUB
-    source = stub if module == PACKAGE else stub.parent / module.rpartition(".")[2] / "__init__.py"
-    tree = ast.parse(source.read_text(encoding="utf-8"))
+    """Page of the names that a package exports, from the imports in its stub."""
+    stub = ROOT / module.replace(".", "/") / "__init__.pyi"
+    tree = ast.parse(stub.read_text(encoding="utf-8"))
     imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.module]
     names = [(node.module, name.name) for node in imports for name in node.names]
-    names = [(where, name) for where, name in names if where != "__future__"]
     text = [f"# `{module}`\n", *(f"::: {where}.{name}\n" for where, name in names)]
     return "\n".join(text)
 
