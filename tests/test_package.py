@@ -77,10 +77,7 @@ def test_links_and_pictures_survive_on_an_index_of_packages(readme):
     text = readme.for_index(read("README.md"), address, "1.2.3")
     assert all(target.startswith("https://") for target in targets(text))
     assert f'<img src="{address}/raw/v1.2.3/runs/champion/walking.gif" width="380" alt="' in text
-    assert (
-        f"]({address}/blob/v1.2.3/tetra_drake/scenario/KEYS.md#metrics)"
-        in text
-    )
+    assert f"]({address}/blob/v1.2.3/tetra_drake/scenario/KEYS.md#metrics)" in text
     assert len(targets(text)) == len(targets(read("README.md")))
 
 

@@ -7,6 +7,7 @@ among the others.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable
 
 from tetra_drake.formatting import listed
@@ -126,15 +127,16 @@ def _value(node: Tree) -> str:
     words = unit or node.get("format") or _WORDS.get(str(node.get("type")), str(node.get("type")))
     if "items" in node:
         item = _value(node["items"])
-        words = f"list of ({item})" if "," in item else f"list of {item}"
+        item = f"({item})" if re.search(r",| or |×", item) else item
+        if "minItems" in node and node["minItems"] == node.get("maxItems"):
+            return f"{node['minItems']} × {item}"
+        words = f"list of {item}"
     if "enum" in node or "const" in node:
-        words = " or ".join(f"`{member}`" for member in node.get("enum", [node.get("const")]))
+        words = ", ".join(f"`{member}`" for member in node.get("enum", [node.get("const")]))
     limits = [text.format(plainest(node[n], unit)) for n, text in _LIMITS.items() if n in node]
     if {"minimum", "maximum"} <= node.keys():
         limits = [f"{plainest(node['minimum'], unit)} to {plainest(node['maximum'], unit)}"]
     lengths = [text.format(node[n]) for n, text in _LENGTHS.items() if n in node]
-    if len(lengths) == 2 and node["minItems"] == node["maxItems"]:
-        lengths = [f"{node['minItems']} items"]
     return ", ".join([words, *limits, *lengths])
 
 
