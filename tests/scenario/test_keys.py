@@ -29,7 +29,7 @@ def test_an_editor_knows_units_defaults_tags_and_keys_that_files_alone_have():
     spacing = schema["$defs"]["Tetrahedra"]["properties"]["spacing"]
     accepted = [t for t in ("3 in", "balanced", "3", "in") if re.match(spacing["pattern"], t)]
     assert (accepted, spacing["unit"], spacing["minimum"]) == (["3 in", "balanced"], "m", 0)
-    assert schema["$defs"]["Compiled"]["properties"]["max_step"]["default"] == "3 ms"
+    assert schema["$defs"]["Mujoco"]["properties"]["step"]["default"] == "6.25e-05 s"
     tags: list[str] = []
     for key, node in schema["properties"].items():
         for kind in (kind["title"] for kind in members_of(node, schema) if "title" in kind):

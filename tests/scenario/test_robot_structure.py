@@ -65,22 +65,6 @@ def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
     assert np.count_nonzero(blueprint.node_load) == 1
 
 
-def test_springs_and_dampers_of_nodes_add_to_anchors() -> None:
-    given = structure(
-        "{anchors: {a: x}, anchor_stiffness: 1e5 N/m, springs: {a: 2 N/m}, dampers: {g: 4 N*s/m}}"
-    )
-    blueprint = given.blueprint()
-    a, g = blueprint.node_names.index("a"), blueprint.node_names.index("g")
-    assert blueprint.anchor_stiffness[[a, g]].tolist() == [[1e5 + 2, 2, 2], [0, 0, 0]]
-    assert blueprint.anchor_damping[[a, g]].tolist() == [[100, 0, 0], [4, 4, 4]]
-    assert np.count_nonzero(blueprint.anchor_stiffness) == 3
-
-
-def test_a_robot_that_springs_hold_alone_moves() -> None:
-    every = ", ".join(f"{node}: 1 N/m" for node in "abcdefg")
-    assert structure(f"springs: {{{every}}}").blueprint().held.all()
-
-
 def test_a_node_that_nothing_uses_is_left_out_with_a_note(tmp_path, caplog) -> None:
     file = tmp_path / "my.yaml"
     file.write_text(FILE.replace("nodes:", "nodes:\n  spare: [1, 1, 1]", 1))
@@ -123,8 +107,6 @@ TWO_FIXED = "nodes: {h: [1, 1, 1], i: [1, 1, 2]}\nanchors: {h: xyz, i: xyz}\n"
         ("{nodes: {h: [1, 1, 1]}, anchors: {h: xz}}", "nodes.h", ["no strut", "xyz"]),
         ("{nodes: {h: [1, 1, 1]}, loads: {h: [0 N, 0 N, 1 N]}}", "loads.h", ["unused"]),
         ("{nodes: {h: [1, 1, 1]}, masses: {h: 1 g}}", "nodes.h", ["no cable"]),
-        ("springs: {q: 1 N/m}", "springs.q", ["unknown", "'q'"]),
-        ("dampers: {g: -1 N*s/m}", "dampers.g", ["-1"]),
         ("struts: {bar: {density: 0}}", "nodes.f", ["0 kg"]),
         ("anchors: {a: xyz, b: yz, c: z, d: xyz, e: xy, f: xyz, g: xy}", "anchors", ["every body"]),
         (f"{TWO_FIXED}cables: {{long: {{pairs: [[h, i]]}}}}", "cables.long.pairs[0]", ["fixed"]),

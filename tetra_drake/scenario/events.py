@@ -10,8 +10,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.robot_structure import cable_numbers
+from tetra_drake.scenario.blueprint import Blueprint, cable_numbers
 from tetra_drake.settings.quantities import Keyed, Time
 from tetra_drake.settings.refusals import hint, refuse
 from tetra_drake.settings.section import Section

@@ -13,7 +13,7 @@ import math
 import operator
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -22,9 +22,8 @@ from pydantic import Field
 
 from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_stretch
 from tetra_drake.laws.model import WORLD
-from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia
+from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
-from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.scenario.structure_graph import (
     Member,
     Pair,
@@ -36,7 +35,6 @@ from tetra_drake.scenario.structure_graph import (
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.quantities import (
     Acceleration,
-    Damping,
     Density,
     ForceQuantity,
     InertiaQuantity,
@@ -49,7 +47,6 @@ from tetra_drake.settings.quantities import (
 )
 from tetra_drake.settings.refusals import described, hint, refuse
 from tetra_drake.settings.section import (
-    Kinds,
     Section,
     Varied,
     mapped,
@@ -264,14 +261,6 @@ class StructureFile(RobotSettings):
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
-    springs: Keyed[str, Annotated[Stiffness, Field(gt=0)]] = Field(
-        default={}, exclude_if=operator.not_
-    )
-    """Stiffness, along all axes, of springs from nodes of bodies to their places in the file."""
-    dampers: Keyed[str, Annotated[Damping, Field(gt=0)]] = Field(
-        default={}, exclude_if=operator.not_
-    )
-    """Damping, along all axes, of nodes of bodies, such as of a float in oil."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz: nodes of struts by a spring and a
     damper, others are fixed."""
@@ -348,19 +337,15 @@ class StructureFile(RobotSettings):
                 for names in self.actuated.values()
             ),
         )
-        if not (self.joints or held.any() or self.springs or self.dampers):
+        if not (self.joints or held.any()):
             return blueprint
-        springs, dampers = (
-            np.array([[of.get(node, 0.0)] for node in nodes]) for of in (self.springs, self.dampers)
-        )
-        is_firm = bool(self.joints) or held.any()
-        firm = min(blueprint.firm_stiffness(self.gravity)) if is_firm else 0.0
+        firm = min(blueprint.firm_stiffness(self.gravity))
         anchors, of_joints = self.anchor_stiffness or firm, self.joint_stiffness or firm
         joints = np.array([joint.stiffness or of_joints for joint in self.joints.values()])
         return dataclasses.replace(
             blueprint,
-            anchor_stiffness=anchors * blueprint.anchor_stiffness + springs,
-            anchor_damping=anchors * blueprint.anchor_damping + dampers,
+            anchor_stiffness=anchors * blueprint.anchor_stiffness,
+            anchor_damping=anchors * blueprint.anchor_damping,
             joint_stiffness=joints,
             joint_damping=joints * blueprint.joint_damping,
         )
@@ -520,7 +505,7 @@ class StructureFile(RobotSettings):
             if max(map(abs, place)) > LONGEST:
                 expected = f"expected coordinates of at most {LONGEST:g} m"
                 refuse(f"nodes.{node}", f"found {place}, {expected}")
-        blueprint = self.model_copy(update={"springs": {}}).blueprint()  # which hold nothing fast
+        blueprint = self.blueprint()
         self._check_joined(blueprint)
         blueprint.check()
         self._check_actuated(blueprint.cable_names)
@@ -554,8 +539,7 @@ class StructureFile(RobotSettings):
         moving = [(f"masses.{node}", node) for node in self.masses]
         for name, group in self.spheres.items():
             moving += [(f"spheres.{name}.nodes[{i}]", node) for i, node in enumerate(group.nodes)]
-        for key in ("loads", "springs", "dampers"):
-            moving += [(f"{key}.{node}", node) for node in getattr(self, key)]
+        moving += [(f"loads.{node}", node) for node in self.loads]
         if self.contacts != "all":
             moving += [(f"contacts[{i}]", node) for i, node in enumerate(self.contacts)]
         return moving
@@ -650,18 +634,3 @@ class ParametricRobot(RobotSettings):
     def _check(self) -> Self:
         self.blueprint().check_sizes()
         return check_tolerances(self)
-
-
-RobotKind = Annotated[Tetrahedra | StructureFile, Kinds(RobotSettings)]
-"""Robot of a scenario: a row of tetrahedra or a structure. A mapping without a tag is a
-Tetrahedra."""
-
-
-def cable_numbers(names: Iterable[str]) -> dict[str, int]:
-    """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its nodes
-    in either order."""
-    numbers: dict[str, int] = {}
-    for number, name in enumerate(names):
-        group, *nodes = name.split()
-        numbers[name] = numbers[" ".join((group, *nodes[::-1]))] = number
-    return numbers
