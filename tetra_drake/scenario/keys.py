@@ -71,7 +71,7 @@ def keys_page() -> str:
     parts, others = [_INTRODUCTION], []
     schema = Scenario.model_json_schema()
     for key, node in schema["properties"].items():
-        items, told = node.get("items"), dict[str, str]()
+        items, told = node.get("items"), dict[str, tuple[str, str]]()
         sections = [one for one in members_of(items or node, schema) if "$ref" in one]
         inner = f"{key}[0]" if items else key
         for section in sections:
@@ -92,9 +92,11 @@ def keys_page() -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def _list_of_keys(rows: Iterable[tuple[str, Tree]], told: dict[str, str], kind: str) -> str:
-    """Keys of a kind of a section as a list. `told` has the lines of other kinds of the section by
-    key, each with its kind; equal ones are not repeated."""
+def _list_of_keys(
+    rows: Iterable[tuple[str, Tree]], told: dict[str, tuple[str, str]], kind: str
+) -> str:
+    """Keys of a kind of a section as a list. `told` has the kind that told a key with the same text
+    first, and its default there; the key is not told again, except for another default."""
     lines, again = [], dict[str, list[str]]()
     for key, node in rows:
         default = json.dumps(node["default"]).strip('"') if "default" in node else ""
@@ -102,13 +104,13 @@ def _list_of_keys(rows: Iterable[tuple[str, Tree]], told: dict[str, str], kind: 
             default = "optional"
         elif default:
             default = f"default {default}" if "unit" in node else f"default `{default}`"
-        value = _value(node) + (f"; {default}" if default else "")
-        line = f"- `{key}` ({value}): {' '.join(node['description'].split())}"
-        if line in told:
-            again.setdefault(told[line], []).append(f"`{key}`")
+        value, text = _value(node), " ".join(node["description"].split())
+        other, usual = told.setdefault(f"{key} {value} {text}", (kind, default))
+        if other == kind:
+            lines.append(f"- `{key}` ({'; '.join(filter(None, [value, default]))}): {text}")
         else:
-            lines.append(line)
-            told[line] = kind
+            differs = f" ({default})" if default != usual else ""
+            again.setdefault(other, []).append(f"`{key}`{differs}")
     lines += [f"- {listed(keys)}: as for `{first}`" for first, keys in again.items()]
     return "\n".join(lines)
 
