@@ -192,7 +192,7 @@ def page(structures: pd.DataFrame, known: pd.DataFrame) -> str:
         known=len(known),
         apart=rounded(100.0 * apart.max(), 2),
         moves=listed([f"{rounded(1e9 * far)} nm ({one})" for one, far in farthest.items()]),
-        names=", ".join(f"[{name}]({name}.yaml)" for name in structures["structure"]),
+        names=" · ".join(f"[{name}]({name}.yaml)" for name in structures["structure"]),
     )
 
 

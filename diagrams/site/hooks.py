@@ -35,7 +35,7 @@ from cells import read_cells  # noqa: E402
 TUTORIALS = "diagrams/tutorials"
 RUNS = ROOT / "out/tutorials"
 """What tutorials print and draw, kept for the next build with the same sources."""
-PACKAGE = "tetra_drake"
+PACKAGE, STUB = "tetra_drake", "tetra_drake/__init__.pyi"
 BESIDE = "runs/meshcat.js"
 """What replays load."""
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".cff": "yaml"}
@@ -182,8 +182,9 @@ def folder_page(folder: Path) -> str:
 
 def api_page(module: str) -> str:
     """Page of the names that a package exports, from the imports in its stub."""
-    stub = ROOT / module.replace(".", "/") / "__init__.pyi"
-    tree = ast.parse(stub.read_text(encoding="utf-8"))
+    stub = ROOT / STUB
+    source = stub if module == PACKAGE else stub.parent / module.rpartition(".")[2] / stub.name
+    tree = ast.parse(source.read_text(encoding="utf-8"))
     imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.module]
     names = [(node.module, name.name) for node in imports for name in node.names]
     text = [f"# `{module}`\n", *(f"::: {where}.{name}\n" for where, name in names)]
