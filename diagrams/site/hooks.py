@@ -189,13 +189,12 @@ def folder_page(folder: Path) -> str:
 
 
 def api_page(module: str) -> str:
-    """Page of the names that a module exports, from the imports in its stub or in itself."""
+    """Page of the names that a package exports, from the imports in its stub."""
     stub = ROOT / STUB
-    source = stub if module == PACKAGE else stub.parent / module.rpartition(".")[2] / "__init__.py"
+    source = stub if module == PACKAGE else stub.parent / module.rpartition(".")[2] / stub.name
     tree = ast.parse(source.read_text(encoding="utf-8"))
     imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.module]
     names = [(node.module, name.name) for node in imports for name in node.names]
-    names = [(where, name) for where, name in names if where != "__future__"]
     text = [f"# `{module}`\n", *(f"::: {where}.{name}\n" for where, name in names)]
     return "\n".join(text)
 

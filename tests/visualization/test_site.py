@@ -97,6 +97,12 @@ def test_a_tutorial_that_fails_ends_the_build_but_not_one_without_its_package(ho
     assert not list((tmp_path / "kept").iterdir())
 
 
+def test_the_pages_of_the_packages_have_their_names(hooks):
+    for package, name in ("engines.simulate", "simulate"), ("systems.cable_network", "AddCables"):
+        page = hooks.api_page("tetra_drake.systems" if "systems" in package else "tetra_drake")
+        assert f"::: tetra_drake.{package}.{name}\n" in page
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """The folder of the site, built without running tutorials."""

@@ -140,8 +140,7 @@ class CpgKind(Section):
     """Time until which the cables are not actuated."""
     signals: Literal["listing", "live"] = "live"
     """How the signals are computed. `listing`: before the simulation, by forward Euler, as in the
-    thesis's listing. `live`: the network is integrated together with the robot. Feedback needs
-    `live`."""
+    thesis's listing. `live`: integrated with the robot, as feedback needs it."""
     listing_step: Time = Field(default=5e-4, ge=1e-6)
     """Time step of signals that are computed beforehand."""
     feedback: list[Pathway] = Field(default=[])

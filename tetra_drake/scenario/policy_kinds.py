@@ -68,9 +68,8 @@ class SensingPolicy(PolicyKind):
 
     readings: list[Reading] = Field(default=["clock", "lengths", "normal_forces"], min_length=1)
     """Readings that the policy gets; see the class Readings. `clock` is sine and cosine of a clock.
-    Lengths of cables are changes since the start, as shares; rates are shares per second. Forces
-    are in units of the robot's weight, positions of nodes from the robot's centre in units of the
-    first strut, velocities in this unit per second."""
+    Lengths are changes since the start, as shares. Forces are in units of the robot's weight,
+    positions of nodes from the robot's centre in units of the first strut."""
     clock: Time = Field(default=1.0, gt=0)
     """Period of the clock."""
 
