@@ -163,28 +163,3 @@ def test_a_gait_file_with_a_wrong_body_is_refused(tmp_path, prism, run, refused)
             load_gait(file, prism)
     with refused("ParameterSpace", "gait random gait 80", f"lacks the body's {SIDE}"):
         ParameterSpace.of(prism).vector(seeded_gait(prism.with_changes({"evolve": {}})))
-
-
-@pytest.mark.parametrize(
-    ("key", "bounds", "problem"),
-    [
-        (SIDE, ["400 N/m", "50 N/m"], "found 400 N/m to 50 N/m, expected the least value first"),
-        (SIDE, ["4 s", "50 N/m"], "found '4 s', expected a quantity that converts to N/m"),
-        (SIDE, [4.0, "50 N/m"], "found 4.0 without a unit"),
-        (SIDE, ["-4 N/m", "50 N/m"], "found '-4 N/m', expected greater than 0"),
-        (f"{SIDE}, friction.static", ["50 N/m", "60 N/m"], "expected a valid number"),
-        ("robot.cables.side.stifness", ["5 N/m", "6 N/m"], f"did you mean '{SIDE}'?"),
-        ("robot.cables.side.pairs", ["5 N/m", "6 N/m"], "found a list, expected the key of"),
-        ("robot.nodes.n3.z", ["5 cm", "6 cm"], "did you mean 'robot.nodes.n3'?"),
-        ("friction.kinetic", [0.1, 0.9], "found 0.9, expected at most static, 0.5"),
-        ("gait_bounds.tau_a_min", ["0.1 s", "0.2 s"], "is no key of the robot, expected a key of"),
-        ("engine.tolerance", ["1 m/s", "2 m/s"], "is no key of the robot, expected a key of"),
-    ],
-)
-def test_wrong_bounds_are_refused_with_their_key(prism, refused, key, bounds, problem):
-    with refused("scenario prism", f"evolve.{key}", problem):
-        prism.with_changes({"evolve": {key: bounds}})
-    with refused("scenario prism", f"evolve.{SIDE}", "is given twice"):
-        prism.with_changes({"evolve": {f"{SIDE}, {SIDE}": ["50 N/m", "60 N/m"]}})
-    with refused("scenario thesis", "evolve.robot.tetrahedra", "is a count"):
-        load_scenario("thesis").with_changes({"evolve": {"robot.tetrahedra": [3, 7]}})

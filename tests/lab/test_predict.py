@@ -180,31 +180,6 @@ def test_the_figure_shows_percent_of_the_nominal_value_or_nothing():
     assert [text.get_position()[1] for text in panel.texts] == [0]
 
 
-@pytest.mark.parametrize(
-    ("key", "given", "problem"),
-    [
-        ("struts.bar.length", "100 %", "smaller than the number"),
-        ("struts.bar.length", "1 m", "smaller than the number"),
-        ("cables.line.stiffness", "-2 %", "0 or more"),
-        ("cables.line.stiffness", 5, "N/m"),
-        ("cables.line.stiff", "2 %", "did you mean 'cables.line.stiffness'"),
-        ("cables.line", "2 %", "several units"),
-        ("nodes", "2 % of", "converts to m"),
-        ("masses", "2 % 3 %", "expected a number, or a share"),
-        pytest.param("masses", 10**400, "converts to kg", id="beyond floats"),
-    ],
-)
-def test_a_tolerance_that_fits_no_number_is_refused(key, given, problem, refused):
-    with refused("scenario anchored", f"robot.tolerances.{key}", problem):
-        hung().with_changes({"robot.tolerances": {key: given}})
-
-
-def test_a_length_between_anchors_has_no_tolerance(refused):
-    held = scenario_of(SWINGING | {"anchors": {"a": "z", "b": "z"}})
-    with refused("scenario anchored", "robot.tolerances.struts.bar.length", "key nodes"):
-        held.with_changes({"robot.tolerances": {"struts.bar.length": "1 mm"}})
-
-
 def test_no_tolerance_no_draw_and_no_such_quantity_are_refused(refused):
     with refused("scenario anchored", "tolerances", "found none"):
         predict(hung(), ["frequency 1"])

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.format_page import EXAMPLE
+from helpers.files import CRANE
 from jsonschema import Draft202012Validator
 
 from tetra_drake.errors import InputError
@@ -20,7 +20,7 @@ from tetra_drake.settings.refusals import TAG
 from tetra_drake.settings.section import parts_in
 
 STRUCTURE_FILES, SCENARIO_FILES = (sorted(each.glob("*.yaml")) for each in (STRUCTURES, SCENARIOS))
-STRUCTURE_TEXTS = [EXAMPLE, *(file.read_text("utf-8") for file in STRUCTURE_FILES)]
+STRUCTURE_TEXTS = [CRANE, *(file.read_text("utf-8") for file in STRUCTURE_FILES)]
 SCENARIO_TEXTS = [file.read_text("utf-8") for file in SCENARIO_FILES]
 
 

@@ -2,12 +2,15 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import pytest
+import yaml
+from helpers.files import DATA
 from helpers.plugin import declare, install_example
 
 from tetra_drake.errors import InputError
@@ -18,20 +21,7 @@ from tetra_drake.settings import plugins
 from tetra_drake.settings.refusals import TAG
 from tetra_drake.settings.section import Kinds, Section, parts_in
 
-SCENARIO = """\
-format: 1
-base: prism
-name: all-added
-robot: !Scaled {factor: 1.2}
-friction: !Viscous {damping: 5 N*s/m}
-terrain: !Waves {height: 2 mm, wavelength: 30 cm}
-actuation: !Servo {max_force: 20 N, max_speed: 0.2 m/s}
-policy: !Sine {}
-optimizer: !HillClimb {step: 0.2}
-engine: !Drake {}
-simulation: {duration: 4 ms, steady_from: 1 ms, sample_period: 1 ms}
-evolution: {trials: 1, evaluations: 2}
-"""
+SCENARIO = DATA / "scenarios/all_added.yaml"
 TAGS = ["Scaled", "Viscous", "Waves", "Servo", "Sine", "HillClimb"]
 
 USE = """\
@@ -65,7 +55,7 @@ if __name__ == "__main__":
 def run_with(site: Path, folder: Path, program: str, *, jit: bool = False) -> dict:
     """Runs a program in a folder where the file scenario.yaml uses the plug-ins of `site`; returns
     the JSON that it prints."""
-    (folder / "scenario.yaml").write_text(SCENARIO)
+    shutil.copy(SCENARIO, folder / "scenario.yaml")
     (folder / "use.py").write_text(program)
     paths = [str(site), str(Path(plugins.__file__).parents[2])]
     settings = {"PYTHONPATH": os.pathsep.join(paths), "NUMBA_DISABLE_JIT": str(int(not jit))}
@@ -89,11 +79,8 @@ def test_a_plugin_adds_one_of_each_and_records_name_it(used):
     folder, found = used
     assert found["read back"] and found["pickled"] and found["evaluations"] == 2
     assert found["bodies"] == ["bar"]
-    titles = {
-        part["title"]
-        for part in parts_in(json.loads(found["schema"]))
-        if isinstance(part, dict) and isinstance(part.get("title"), str)
-    }
+    parts = [part for part in parts_in(json.loads(found["schema"])) if isinstance(part, dict)]
+    titles = [part.get("title") for part in parts]
     for tag in TAGS:
         assert f"!{tag}`" in found["page"] and f"!{tag}" in titles
     assert "Friction divided by velocity." in found["page"]
@@ -139,22 +126,7 @@ def test_a_kind_of_a_plugin_is_one_of_the_union(site):
     assert plugins.plugins_of([("friction", Coulomb())]) == {}
 
 
-DAMAGED = {
-    "missing": ("", "nowhere:Odd", "No module named 'nowhere'"),
-    "without the class": ("", "odd:Odd", "has no attribute 'Odd'"),
-    "fails": ("1 / 0", "odd:Odd", "ZeroDivisionError: division by zero"),
-    "ends Python": ("import sys; sys.exit(3)", "odd:Odd", "SystemExit: 3"),
-    "no Python": ("class", "odd:Odd", "SyntaxError"),
-    "no reference": ("", "odd odd", "odd odd"),
-    "a number": ("Odd = 3", "odd:Odd", "found 3, expected a class of "),
-    "another class": (
-        "class Odd: pass",
-        "odd:Odd",
-        "expected a class of ",
-    ),
-    "another tag": (KIND.format("Even"), "odd:Even", "found !Even, expected !Odd"),
-    "imports itself": ("import tetra_drake as td; td.load_scenario()", "odd:Odd", "cannot import"),
-}
+DAMAGED = yaml.safe_load(Path(__file__).with_name("damaged.yaml").read_text("utf-8"))
 
 
 @pytest.mark.parametrize(("text", "value", "problem"), DAMAGED.values(), ids=DAMAGED)
