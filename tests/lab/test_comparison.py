@@ -99,8 +99,6 @@ def test_runs_are_compared_within_their_scenarios(run, refused):
     shares = [c.improvement.loc[("x", "y"), "probability"] for c in found.values()]
     assert len(found) == 2 and shares == [1.0, 0.5]
     assert improvement_over(c.trials for c in found.values()).loc[("x", "y"), "probability"] == 0.75
-    with refused("compare", "labels", "expected 1"):
-        compare(["no run, which is not read yet"], labels=["x", "y"])
     with refused("compare", "scenarios", "tiny, other", "two of one scenario"):
         compare_scenarios(paths[1:3])
 

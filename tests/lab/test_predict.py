@@ -178,17 +178,3 @@ def test_the_figure_shows_percent_of_the_nominal_value_or_nothing():
     assert narrow[:, 0] == pytest.approx([-5.0, 5.0])
     assert np.isnan(zero).any() or not len(zero), "an interval of 2 m about 0 is no share of it"
     assert [text.get_position()[1] for text in panel.texts] == [0]
-
-
-def test_no_tolerance_no_draw_and_no_such_quantity_are_refused(refused):
-    with refused("scenario anchored", "tolerances", "found none"):
-        predict(hung(), ["frequency 1"])
-    known = hung(**{"masses": "2 % each"})
-    for arguments in ({"draws": 0}, {"quantities": []}, {"command": "forward"}):
-        with refused("predict", *arguments):
-            predict(known, **({"quantities": ["frequency 1"]} | arguments))
-    with refused("predict", "quantities.height", "found 5"):
-        predict(known, {"height": 5})
-    for name in ("tension lines", "speed", "frequency x"):
-        with refused("predict", f"quantities.{name}"):
-            predict(known, [name])

@@ -176,8 +176,3 @@ def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["draws"], summary["seed"]) == (DRAWS, 5)
     assert {row["what"] for row in summary["changes"]} == set(judgement.alone["what"])
-
-
-def test_a_gait_of_another_robot_is_refused(scenario, refused):
-    with refused("gait random gait 1", "parameters", "expected the 6"):
-        robustness.robustness(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)
