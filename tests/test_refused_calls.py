@@ -49,10 +49,10 @@ def planner(cost: Any = (("p_WN", [0.0, 0.0, -1.0]),), scenario=None, **options)
     return Planner(lifted, given, **small | {"limits": [[-1.0], [1.0]]} | options)
 
 
-def fitted(parameters=None, measurements=(Rest(positions={"a z": 0.5}),)):
+def fitted(parameters=None, **changes):
     given = parameters or {"robot.cables.line.stiffness": (100.0, 400.0)}
-    several = [*measurements] if isinstance(measurements, tuple) else measurements
-    fit(hung(), several, given, out=Path("fit"), source="fit.yaml")
+    case = {"measurements": [Rest(positions={"a z": 0.5})]}
+    fit(hung(), (case | changes)["measurements"], given, out=Path("fit"), source="fit.yaml")
 
 
 def diagram(scenario, **options):
