@@ -37,7 +37,7 @@ from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
-from tetra_drake.scenario.engine_kinds import Drake, Mujoco
+from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -395,6 +395,11 @@ def test_the_smallest_vibrations_keep_their_damping(frequency, ratio, size, engi
     assert robot.longest_step == pytest.approx(np.cbrt(ratio / np.sqrt(2.0)) / rate, rel=0.05)
     left = np.log(np.hypot(x, v / rate) / size) / (-rate * float(end.time))
     assert left == pytest.approx(ratio, rel=0.05)
+
+
+def test_a_longest_step_that_is_given_is_kept_beside_light_damping():
+    assert Compiled(max_step=3e-3).longest_step(light=1e-4) == 3e-3
+    assert Compiled().longest_step(light=1e-4) == 1e-4
 
 
 def test_robots_with_well_damped_cables_take_steps_of_any_length():

@@ -18,7 +18,8 @@ from tetra_drake.robot.gait_file import load_gait, save_gait
 from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.policies import driven_names, imported_function
+from tetra_drake.scenario.policies import driven_names
+from tetra_drake.scenario.policy_kinds import imported_function
 
 DRAKE = "!Drake {scheme: runge_kutta3, accuracy: 1e-4, max_step: 2 ms}"
 WITNESS = "!Drake {scheme: runge_kutta3, accuracy: 1e-5, max_step: 1 ms, mode_changes: witness}"

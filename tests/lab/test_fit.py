@@ -21,7 +21,6 @@ from tetra_drake.formatting import silent
 from tetra_drake.lab.fit import measurements
 from tetra_drake.lab.fit.fit import fit, fit_values
 from tetra_drake.lab.fit.measurements import MotionCapture, Prediction, Rest
-from tetra_drake.lab.fit.placement import matches
 from tetra_drake.lab.fit.problem import FitProblem, Parameter
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.command_file import command_text, load_command, table_text
@@ -364,42 +363,30 @@ def test_the_offset_of_a_marker_is_found_in_the_axes_of_its_body(lab, truth, tmp
     assert abs(values - without.numbers["measured"]).max() > 1e-3
 
 
-def test_unnamed_markers_are_matched_by_their_places_or_refused_with_their_nodes(
+def test_markers_are_named_by_their_nodes_or_refused_with_the_key_for_it(
     lab, truth, tmp_path, refused
 ):
     file, names = tmp_path / "log.csv", [f"M{number}" for number in range(6)]
     named = seen_by_cameras(tmp_path / "named.csv", lab, **TURNED).read(truth, "")
-    # Loads move nodes by some mm. Without them, the prism turned by a third is the same.
-    found = seen_by_cameras(file, lab, **TURNED, names=names).read(truth, "")
-    assert found.numbers.equals(named.numbers)
-    coarse = {"names": names, "uncertainty": 5e-3}
-    with refused(file, "M0", "n0 or n1 or n2", "markers"):
-        seen_by_cameras(file, lab, **TURNED, **coarse).read(truth, "")
-    one = seen_by_cameras(file, lab, **TURNED, **coarse, markers={"M0": "n0"})
-    assert one.read(truth, "").numbers["label"].equals(named.numbers["label"])
-    for markers in ({"M0": "n9"}, {"M9": "n0"}, {"M0": "n0", "M1": "n0"}):
-        with refused(file, f"markers.{next(iter(markers))}"):
-            one.model_copy(update={"markers": markers}).read(truth, "")
+    with refused(file, "M0 x_mm", "n0", "markers"):
+        seen_by_cameras(file, lab, **TURNED, names=names).read(truth, "")
+    given = dict(zip(names, NODES, strict=True))
+    all_named = seen_by_cameras(file, lab, **TURNED, names=names, markers=given)
+    assert all_named.read(truth, "").numbers.equals(named.numbers)
+    for marker, node in (("M0", "n9"), ("M9", "n2"), ("M0", "n4")):
+        with refused(file, f"markers.{marker}"):
+            all_named.model_copy(update={"markers": given | {marker: node}}).read(truth, "")
     with refused(file, "", "0.001"):  # metres that are called mm
         seen_by_cameras(file, lab, scale=1e-3).read(truth, "")
 
 
-def test_markers_match_nodes_where_only_one_choice_is_near():
-    generator = np.random.default_rng(1)
-    p, nodes = generator.normal(size=(8, 3)), [5, 2, 7, 0, 1, 3]
-    turn = Rotation.from_euler("XYZ", [-90.0, 0.0, 200.0], degrees=True)
-    seen = turn.apply(p[nodes]) + [10.0, 0.0, 3.0] + 1e-3 * generator.normal(size=(6, 3))
-    anywhere = np.full((6, 8), True)
-    assert matches(p, seen, anywhere, 1e-3) == [nodes]
-    assert matches(p, seen * [1.0, -1.0, 1.0], anywhere, 1e-3) == []
-    # A square with a mast is the same after quarters of a turn.
-    p = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 3.0]])
-    assert len(matches(p, turn.apply(p), np.full((5, 5), True), 1e-3)) == 4
-    # Three rungs of a ladder of four may be the first or the last three.
-    rung = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.6]])
-    p = np.concatenate([rung + np.array([each, 0.0, 0.0]) for each in range(4)])
-    choices = matches(p, p[3:12], np.full((9, 12), True), 1e-3)
-    assert choices == [[*range(first, first + 9)] for first in (0, 3)]
+def test_positions_at_rest_may_be_in_another_frame():
+    robot = hung()
+    (seen,) = Rest(positions={"a z": 0.0}).read(robot, "").predict([robot])
+    # The model's z is along -y of the other frame, half a metre from its origin.
+    turned = Rest(positions={"a y": 0.0}, origin=[0.0, 0.5, 0.0], turn=["90 deg", 0, 0])
+    (there,) = turned.read(robot, "").predict([robot])
+    assert there.values == pytest.approx(0.5 - seen.values)
 
 
 def test_where_a_number_is_far_off_there_is_no_interval_and_it_is_named(by_formula):

@@ -198,8 +198,6 @@ def test_what_a_file_of_others_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "parts",
     [
-        {"joint": FREE.format('stiffness="30" damping="3"')},
-        {"joint": FREE.format('stiffness="30" armature="0.5"')},
         {"body": 'gravcomp="0.4"'},
         {"body": 'gravcomp="0.4"', "joint": FREE.format('actuatorgravcomp="true"')},
         {"rope": "", "more": on_rope('position kp="500" ctrlrange="0.5 0.9"')},
@@ -231,25 +229,11 @@ def test_a_robot_rests_where_it_rests_in_mujoco_at_control_0(parts, tmp_path: Pa
     assert left_at_rest(ball(tmp_path, **parts)) == approx([0.0, 0.0, 0.0], abs=1e-4)
 
 
-def test_armature_is_mass_without_weight(tmp_path: Path) -> None:
-    structure = converted(ball(tmp_path, joint=FREE.format('armature="0.5" damping="3"')))
-    body, own = structure.bodies["ball"], 0.4 * 0.05**2  # of a sphere
-    assert [body.mass, body.inertia] == [approx(1.5), approx([own + 0.5] * 3 + [0] * 3)]
-    assert structure.loads == {"eye": approx([0, 0, 0.5 * 9.81])}
-    assert [structure.springs, structure.dampers] == [{}, {"eye": 3}]
-    assert "ball" in str(structure.ignored), "of the torques"
-
-
-def test_free_joints_at_one_place_have_a_damper_each(tmp_path: Path) -> None:
-    rod = '<body name="{0}"><joint type="free" damping="2"/><geom type="capsule" size="0.01" '
-    rod += 'fromto="{1} 0 1 {1} 0 2"/><site name="s{0}" pos="{1} 0 1"/></body>'
-    path = '<site site="sa"/><site site="sb"/>'
-    text = f"<mujoco><worldbody>{rod.format('a', 1)}{rod.format('b', 2)}</worldbody><tendon>"
-    text += f'<spatial stiffness="9" springlength="0 1">{path}</spatial></tendon></mujoco>'
-    (tmp_path / "a.xml").write_text(text)
-    structure = converted(tmp_path / "a.xml")
-    assert [structure.nodes["a"], structure.dampers] == [structure.nodes["b"], {"a": 2, "b": 2}]
-    assert structure.blueprint().body_of_node == ("a", "a", "b", "b")
+def test_what_acts_on_a_free_joint_is_told(tmp_path: Path) -> None:
+    acting = {"stiffness": 30, "damping": 3, "armature": 0.5, "frictionloss": 1}
+    given = " ".join(f'{name}="{value}"' for name, value in acting.items())
+    told = converted(ball(tmp_path, joint=FREE.format(given))).ignored
+    assert told == [f"the {name} of free joints, left out: root" for name in acting]
 
 
 def test_what_a_model_has_disabled_is_nothing(tmp_path: Path) -> None:
@@ -257,11 +241,13 @@ def test_what_a_model_has_disabled_is_nothing(tmp_path: Path) -> None:
     off = '<flag damper="disable" frictionloss="disable" gravity="disable"/>'
     file = ball(tmp_path, joint=joint, option=off, rope=f'{SPRING} range="0 0.4"')
     structure = converted(file)
-    assert [structure.gravity, structure.dampers] == [0.0, {}]
+    assert structure.gravity == 0.0
     assert {cables.damping for cables in structure.cables.values()} == {0.0}
     told = str(structure.ignored)
     assert "'limited' of tendons, left out: rope" in told
+    assert "the stiffness of free joints" in told
     assert "frictionloss" not in told
+    assert "the damping" not in told
     for flag in ("limit", "constraint"):
         file.write_text(file.read_text().replace("gravity=", f'{flag}="disable" gravity='))
         assert "limited" not in str(converted(file).ignored)
@@ -290,7 +276,7 @@ def test_anchors_and_loads_come_back(tmp_path: Path) -> None:
     assert [structure.anchors, structure.loads] == [given.anchors, given.loads]
     held = [structure.anchor_stiffness, structure.anchor_time_constant]
     assert held == approx([given.anchor_stiffness, given.anchor_time_constant])
-    assert [structure.springs, structure.dampers, structure.ignored] == [{}, {}, None]
+    assert structure.ignored is None
 
 
 GHOST = """<body name="ghost" pos="0 0 1"><freejoint/><geom size="0.01" mass="1e-9"/>

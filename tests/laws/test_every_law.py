@@ -21,7 +21,7 @@ from tetra_drake.laws.actuator import (
 )
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.friction import FrictionLaw, Slide, TangentSlide
-from tetra_drake.laws.terrain import HeightField
+from tetra_drake.laws.height_field import HeightField
 from tetra_drake.scenario.scenario import Scenario
 
 CABLE = CableLaw(stiffness=100.0, damping=5.0, free_length=0.2)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tetra_drake.laws.contact import Ground
+from tetra_drake.laws.height_field import HeightField
 from tetra_drake.laws.terrain import (
     FRAME_COLUMNS,
     GAP,
     N_X,
     T1_X,
     T2_Y,
-    HeightField,
     Incline,
     Relief,
     Rough,

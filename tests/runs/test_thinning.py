@@ -12,7 +12,7 @@ from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.lab.elites.elites import elites
-from tetra_drake.laws.terrain import HeightField
+from tetra_drake.laws.height_field import HeightField
 from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 

@@ -7,7 +7,8 @@ import pytest
 from helpers.laws import UNEVEN
 from scipy.interpolate import NdBSpline
 
-from tetra_drake.laws.terrain import Grid, HeightField, Incline, Obstacles, Rough, Steps, Terrain
+from tetra_drake.laws.height_field import HeightField
+from tetra_drake.laws.terrain import Grid, Incline, Obstacles, Rough, Steps, Terrain
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 

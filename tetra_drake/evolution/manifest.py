@@ -40,7 +40,7 @@ from tetra_drake.files import (
     read_text,
     write_whole,
 )
-from tetra_drake.laws.height_files import RECORDED
+from tetra_drake.laws.height_field import RECORDED
 from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import Gait

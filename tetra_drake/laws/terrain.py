@@ -42,7 +42,6 @@ from tetra_drake.kernels.lanes import (
     minimum,
     select,
 )
-from tetra_drake.laws.height_files import HeightFile, HeightPath
 from tetra_drake.laws.kinematics import P_WN
 from tetra_drake.laws.vectors import Vector3, put_vector, vector_at
 from tetra_drake.settings.quantities import Angle, Length
@@ -385,16 +384,11 @@ class Relief(Section):
 
     @property
     def paths(self) -> dict[str, str]:
-        """Paths of the height files that these settings name; the keys are the names of the
-        settings."""
-        return {key: file.path for key, file in self if isinstance(file, HeightFile)}
+        """Paths of the files that these settings name, by the names of the settings."""
+        return {}
 
     def save(self, folder: Path) -> None:
-        """Copies the terrain's height files, if it has any, to the folder of a record. A copy is
-        named heights-DIGEST.npy, by a digest of the heights."""
-        for _, file in self:
-            if isinstance(file, HeightFile):
-                file.save(folder)
+        """Copies the terrain's files, if it has any, to the folder of a record."""
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         """Heights of the terrain on a grid.
@@ -446,12 +440,10 @@ class Incline(Relief):
 
 
 class Steps(Relief):
-    """Stairs across the robot's path, from x = `start` on.
-
-    Each step has a depth and a height: h = height min(count, floor((x - start) / depth) + 1), and 0
-    before `start`. An edge is not vertical: it rises over one cell of the grid of heights before it
-    and one behind it. A cell is about as long as a step is high, but at most a quarter of the
-    depth. Round feet with a radius above twice the height meet sharp edges.
+    """Stairs across the robot's path: h = height min(count, floor((x - start) / depth) + 1), and 0
+    before x = `start`. An edge rises over one cell of the grid before it and one behind it; a cell
+    is about as long as a step is high, at most a quarter of the depth. Round feet with a radius
+    above twice the height meet sharp edges.
     """
 
     place = "over steps"
@@ -479,10 +471,8 @@ class Steps(Relief):
 
 class Rough(Relief):
     """Random ground, interpolated smoothly between the heights of a grid. Neighbours are half a
-    wavelength apart. Their heights are independent and uniform between -2 amplitude and 0.
-
-    The mean height is -amplitude. A robot that stands at z = 0 touches the ground without sinking
-    in.
+    wavelength apart, with independent heights, uniform between -2 amplitude and 0, so that a robot
+    at z = 0 touches the ground without sinking in.
     """
 
     place = "on rough ground"
@@ -504,12 +494,10 @@ class Rough(Relief):
 
 
 class Obstacles(Relief):
-    """Round bumps, h = height max(0, 1 - (r / radius)^2) at the distance r from a bump's centre.
-    Where bumps overlap, the highest counts.
-
-    Each square of side `spacing` has one bump, at a random position. No bump reaches before
-    `start`. The ground is interpolated smoothly between the heights of a grid, so a bump's top is
-    about an eighth lower.
+    """Round bumps, h = height max(0, 1 - (r / radius)^2) at the distance r from a bump's centre;
+    the highest counts. Each square of side `spacing` has one, at a random position; none reaches
+    before `start`. The ground is interpolated smoothly between the heights of a grid, so a bump's
+    top is about an eighth lower.
     """
 
     place = "over obstacles"
@@ -548,28 +536,9 @@ class Obstacles(Relief):
         return Grid(heights, (x[0, 0], y[0, 0]), (cell, cell))
 
 
-class HeightField(Relief):
-    """Heights in m from a file. Rows are along x and columns along y, in ascending order.
-
-    The grid's centre is the origin. The file is numpy's `.npy`, or text of numbers separated by
-    blanks or commas. It has at least 3 x 3 and at most 4 million heights. A relative path starts in
-    the folder of the scenario file that names it. A record keeps a copy of the file, named by a
-    digest of the heights.
-    """
-
-    file: HeightPath
-    """File of heights in m."""
-    cell: Length = Field(gt=0)
-    """Distance between neighbours, along x and y."""
-
-    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
-        heights = self.file.heights
-        x, y = (-0.5 * (size - 1) * self.cell for size in heights.shape)
-        return Grid(heights, (x, y), (self.cell, self.cell))
-
-
 Terrain = Annotated[
-    Flat | Nothing | Incline | Steps | Rough | Obstacles | HeightField, Kinds(Relief)
+    Flat | Nothing | Incline | Steps | Rough | Obstacles,
+    Kinds(Relief, more=["tetra_drake.laws.height_field:HeightField"]),
 ]
 
 

@@ -152,9 +152,9 @@ class Structure(Blueprint):
 
     @property
     def anchors(self) -> AnchorSprings:
-        """Springs and dampers that hold nodes of bodies at their positions in the settings; only
-        the nodes with such ones."""
-        nodes = np.flatnonzero((self.anchor_stiffness + self.anchor_damping).any(axis=1))
+        """Springs that hold nodes of bodies at their positions in the settings; only the nodes with
+        such a spring."""
+        nodes = np.flatnonzero(self.anchor_stiffness.any(axis=1))
         return AnchorSprings(
             nodes,
             carriers=self.carriers[nodes],

@@ -35,10 +35,9 @@ class Drake(EngineSettings):
 
     module: ClassVar[str] = "tetra_drake.engines.drake"
     scheme: Literal["radau3", "runge_kutta3"] | None = None
-    """Integrator: implicit (radau3) or explicit (runge_kutta3). If not given, radau3 for up to 12
-    bodies. For n bodies above it is runge_kutta3, unless dampers stop the fastest motion at a rate
-    above 14 n² per second: the work of radau3 grows with n², the work of runge_kutta3 with the
-    rate."""
+    """Integrator: implicit (radau3) or explicit (runge_kutta3). By default radau3 for up to 12
+    bodies; for n more it is runge_kutta3, unless dampers stop the fastest motion at a rate above 14
+    n² per second: the work of radau3 grows with n², the work of runge_kutta3 with the rate."""
     accuracy: float | None = Field(default=None, gt=0)
     """Target accuracy per step. If not given, half the least damping ratio of a cable, anchor or
     joint with the robot's mass, from 2e-5 to 0.005: longer steps of radau3 would damp vibrations
@@ -63,12 +62,13 @@ class Compiled(EngineSettings):
     """Permitted error per step of the velocity of a body; for rotations, of its strut tips. If not
     given, 0.1 mm/s; 5 mm/s where friction is nearly viscous, as in the scenario thesis; a tenth of
     it for robots with joints."""
-    max_step: Time = Field(default=_LONGEST_STEP, gt=SHORTEST_STEP, le=1)
-    """Longest step. The default becomes shorter where damping is light, as for !Drake."""
+    max_step: Time | None = Field(default=None, gt=SHORTEST_STEP, le=1)
+    """Longest step. If not given, 3 ms; less where damping is light, as for !Drake."""
 
     def longest_step(self, light: float) -> float:
-        """The longest step (s): `max_step`, or `light` if that is less than the default."""
-        return self.max_step if self.max_step != _LONGEST_STEP else min(_LONGEST_STEP, light)
+        """The longest step (s): `max_step`; if not given, the default, or `light` if that is
+        less."""
+        return self.max_step or min(_LONGEST_STEP, light)
 
     def tolerance_under(self, friction: FrictionKind, *, is_jointed: bool) -> float:
         """The tolerance in m/s; if not given, the default for this friction, with or without

@@ -15,7 +15,7 @@ import os
 import re
 import sys
 import typing
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self, Union
 
@@ -24,6 +24,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, Validatio
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema
 
+from tetra_drake import on_demand
 from tetra_drake.errors import InputError
 from tetra_drake.settings.plugins import KINDS, entries, loaded, refusal
 from tetra_drake.settings.quantities import EMPTY, Quantity
@@ -186,21 +187,24 @@ class Kinds:
     first type of the union.
 
     With a `base` class, installed plug-ins can add types that derive from it, by entry points of a
-    `group`. A section with such a union is built when it is first used (defer_build), because
-    plug-ins import this package.
+    `group`; `more` names further types by their places, "module:class".
+    A section with such a union is built when it is first used (defer_build), because plug-ins
+    import this package.
     """
 
     bases: ClassVar[dict[str, tuple[type, ...]]] = {}
     """Base classes of the kinds that plug-ins can add to, by group."""
 
-    def __init__(self, base: type[Section] | None = None, group: str = KINDS) -> None:
-        self.base, self.group = base, group
+    def __init__(
+        self, base: type[Section] | None = None, group: str = KINDS, *, more: Sequence[str] = ()
+    ) -> None:
+        self.base, self.group, self.more = base, group, more
         self.bases[group] = *self.bases.get(group, ()), *([base] if base else ())
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
     ) -> CoreSchema:
-        kinds = typing.get_args(source)
+        kinds = (*typing.get_args(source), *map(on_demand.loaded, self.more))
         if self.base:
             kinds += (*self._added({kind.tag for kind in kinds}, self.base),)
 

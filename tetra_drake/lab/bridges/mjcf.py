@@ -7,7 +7,7 @@ of the world are fixed nodes. The places are those at MuJoCo's initial state, qp
 spheres and capsules touch a level plane are feet, and the plane becomes the ground at z = 0. A free
 robot that is lower is raised to it.
 Actuators of tendons become oscillators. What an actuator exerts at control 0 belongs to its cable,
-or to its site. A limit of a tendon is a stiff cable. Free joints may have springs and dampers.
+or to its site. A limit of a tendon is a stiff cable.
 
 Tendons of MuJoCo push below their spring length, and their dampers also act where a cable is slack.
 Cables do neither. A scenario has its own friction, ground and solver. Cameras, lights, materials
@@ -128,12 +128,6 @@ class _MjcfTranslation:
         """Stiffness, damping and free length of each tendon, or of its limit (tendons, 3)."""
         self.is_string = model.tendon_limited & (self.laws[:, 0] <= 0.0)
         self.laws[self.is_string] = limit_laws(model)[self.is_string]
-        self.free = np.zeros((model.nbody, 3))
-        """Stiffness, damping and armature of the free joint of each body (bodies, 3)."""
-        free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
-        first = model.jnt_dofadr[free]
-        laws = [model.jnt_stiffness[free], model.dof_damping[first], model.dof_armature[first]]
-        self.free[model.jnt_bodyid[free]] = np.transpose(laws)
         for what, kind, is_changed in self._changes():
             for number in np.flatnonzero(is_changed).tolist():
                 self._note(what, kind, number)
@@ -161,7 +155,7 @@ class _MjcfTranslation:
         if level is not None and not feet:
             self.notes["floors that nothing touches in MuJoCo, but every node here"] = ["1"]
         held = self._held(used, anchors)
-        is_held = self._nodes_of(_WORLD) or held["anchors"] or held["springs"]
+        is_held = self._nodes_of(_WORLD) or held["anchors"]
         if level is None or not is_held:  # a free robot may stand in the soft floor
             lows = [place[2] - feet.get(name, 0.0) for name, place in self.nodes.items()]
             ground = min([ground, *lows])
@@ -318,11 +312,9 @@ class _MjcfTranslation:
         bodies: Tree = {}
         for root in used:
             parts = np.flatnonzero(self.roots == root)
-            armature = self.free[parts, 2]  # acts like a sphere of this mass and moment of inertia
-            mass = np.append(model.body_mass[parts], armature)
-            centres = np.vstack([self._places(parts, model.body_ipos[parts]), data.xpos[parts]])
+            mass, centres = model.body_mass[parts], self._places(parts, model.body_ipos[parts])
             centre = mass @ centres / mass.sum()
-            inertia = armature.sum() * np.eye(3)
+            inertia = np.zeros((3, 3))
             for part in parts:
                 axes = data.ximat[part].reshape(3, 3)
                 inertia += axes * model.body_inertia[part] @ axes.T
@@ -357,22 +349,15 @@ class _MjcfTranslation:
         return joints, anchors
 
     def _held(self, used: list[int], anchors: Tree) -> Tree:
-        """Loads, springs and dampers of nodes, from free joints, compensated gravity and actuators
-        at sites; and `anchors`, or else anchors for springs of actuators that are all alike."""
+        """Loads of nodes, from compensated gravity and actuators at sites; and `anchors`, or else
+        anchors for springs of actuators that are all alike."""
         model, gravity = self.model, np.array([0.0, 0.0, self._gravity()])
         loads: defaultdict[str, np.ndarray] = defaultdict(lambda: np.zeros(3))
-        tree: Tree = {"anchors": anchors, "springs": {}, "dampers": {}}
+        tree: Tree = {"anchors": anchors}
         lifts = model.body_mass * model.body_gravcomp
-        for body in np.flatnonzero(np.isin(self.roots, used)).tolist():
+        for body in np.flatnonzero(np.isin(self.roots, used) & (lifts != 0.0)).tolist():
             root, name = int(self.roots[body]), self._name("body", body)
-            if lifts[body]:
-                loads[self._node(root, self.data.xipos[body], name)] += lifts[body] * gravity
-            if self.free[body].any():
-                node = self._node(root, self.data.xpos[body], name)
-                stiffness, damping, armature = self.free[body].tolist()
-                loads[node] += armature * gravity
-                tree["springs"] |= {node: _text(stiffness, "N/m")} if stiffness else {}
-                tree["dampers"] |= {node: _text(damping, "N*s/m")} if damping else {}
+            loads[self._node(root, self.data.xipos[body], name)] += lifts[body] * gravity
         pushes = [*self._pushes(used)]
         laws = [push.law for push in pushes if any(push.law)]
         axes = {(push.node, push.axis) for push in pushes if any(push.law)}
@@ -449,12 +434,12 @@ class _MjcfTranslation:
         mujoco, model = self.mujoco, self.model
         is_free, first = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, model.jnt_dofadr
         yield "joints that are not free, read as rigid", "joint", ~is_free
-        what = "torques of the stiffness and damping of free joints, left out"
-        yield what, "body", self.free[:, :2].any(axis=1)
-        others = [model.dof_frictionloss[first, np.newaxis], model.dof_dampingpoly[first]]
-        has_others = np.hstack([*others, model.jnt_stiffnesspoly]).any(axis=1)
-        what = "frictionloss of free joints and what is not linear in them, left out"
-        yield what, "joint", is_free & has_others
+        acting = {"stiffness": model.jnt_stiffness, "stiffnesspoly": model.jnt_stiffnesspoly}
+        for name in ("damping", "dampingpoly", "armature", "frictionloss"):
+            acting[name] = getattr(model, f"dof_{name}")[first]
+        for name, values in acting.items():
+            is_set = is_free & np.atleast_2d(values.T).any(axis=0)
+            yield f"the {name} of free joints, left out", "joint", is_set
         kinds = [mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD]
         is_known = np.isin(model.eq_type, kinds) & model.eq_active0.astype(bool)
         yield "other equality constraints, left out", "equality", ~is_known

@@ -101,7 +101,7 @@ class Fit:
     clock_offsets: dict[str, float]
     """Time (s) by which the clock of each measurement is ahead of the simulated time."""
     placement: dict[str, Sequence[str]]
-    """What was found besides for each measurement: nodes, frame and offsets of markers."""
+    """What was found besides for each measurement: frame and offsets of markers."""
     misfit: float
     """Sum of squares of the weighted residuals per degree of freedom; 1 if the model and the
     uncertainties are right."""

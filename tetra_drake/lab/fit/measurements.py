@@ -77,7 +77,7 @@ class Prediction(NamedTuple):
     clock_offset: float = 0.0
     """Time (s) by which the clock of the measurement is ahead of the simulated time."""
     notes: Sequence[str] = ()
-    """What was found besides: nodes of markers, frame, and offsets of markers."""
+    """What was found besides: frame, and offsets of markers."""
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,28 @@ class Measured:
     """Whether predictions have notes."""
 
 
-class MotionCapture(Section):
+class _Placed(Section):
+    """Base class of measurements whose positions may be in another frame than the model's."""
+
+    origin: Position | None = None
+    """Position of the model's origin in the frame of the measurement."""
+    turn: Annotated[list[Angle], Field(min_length=3, max_length=3)] | None = None
+    """Angles of the model in this frame: about x, the turned y and z. -90 degrees about x: y is
+    up."""
+
+    def frame(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rotation (3, 3) and origin (3,) in m of the model's world in the frame of the
+        measurement; what is not given is 0."""
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_euler("XYZ", self.turn or np.zeros(3)).as_matrix()
+        return turn, np.array(self.origin or np.zeros(3))
+
+
+class MotionCapture(_Placed):
     """Measurement of a robot in motion, for a fit: a log of the positions of markers on nodes over
-    time, as a motion capture records them.
+    time, as a motion capture records them. If neither `origin` nor `turn` is given, a fit finds
+    both, from three markers on.
 
         >>> td.MotionCapture(log="lab/log.csv", command="lab/command.csv", uncertainty=2e-4)
 
@@ -105,8 +124,7 @@ class MotionCapture(Section):
 
     log: str
     """CSV or Parquet file: a column time_s and columns such as "n3 x_mm". An empty cell is a gap.
-    The log lasts as long as the command, or as the simulation if it is shorter. Markers whose names
-    are no nodes are matched with nodes by their places at the start."""
+    The log lasts as long as the command, or as the simulation if it is shorter."""
     command: str | None = None
     """File of the commands that the robot followed."""
     gait: str | None = None
@@ -116,13 +134,8 @@ class MotionCapture(Section):
     clock: Annotated[Time, Field(ge=0)] | None = None
     """Largest offset between the clocks of log and command. A fit finds the offset; 0 for none. If
     not given, any is found if the log is not within the simulated time; otherwise there is none."""
-    origin: Position | None = None
-    """Position of the model's origin in the log. If neither it nor `turn` is given, a fit finds
-    both, from three markers on; otherwise they are 0."""
-    turn: Annotated[list[Angle], Field(min_length=3, max_length=3)] | None = None
-    """Angles of the model in the log: about x, the turned y and z. -90 degrees about x: y is up."""
     markers: Keyed[str, str] = Field(default={})
-    """Nodes by the names of markers."""
+    """Nodes by the names of markers whose names are no nodes."""
     marker_offset: Annotated[Length, Field(ge=0, le=MOST)] = 0.0
     """Standard deviation of a marker's place beside its node along the axes of its body. A fit
     finds such offsets; 0 for none."""
@@ -154,7 +167,7 @@ class MotionCapture(Section):
             expected = f"expected at least the command's {least:g} s"
             problem = f"found {found:g} s, {expected}; give simulation.duration less to fit a part"
             raise InputError(self.log, TIME_S, problem)
-        table, note = self._named(table, structure)
+        table = self._named(table, structure)
         row, column = np.nonzero(np.isfinite(table.to_numpy()))
         offsets = [f"{x[:-1]}offset {x[-1]}" for x in table if self.marker_offset]
         none = [0.0] * len(offsets)
@@ -164,62 +177,47 @@ class MotionCapture(Section):
             "measured": [*table.to_numpy()[row, column], *none],
             "uncertainty": [self.uncertainty] * len(row) + [self.marker_offset] * len(offsets),
         }
-        predict = functools.partial(self.predict, driver=driver, log=table, note=note)
+        predict = functools.partial(self.predict, driver=driver, log=table)
         return Measured(f"{name}, {Path(self.log).name}", pandas.DataFrame(numbers), predict, True)
 
-    def _named(self, log: pandas.DataFrame, structure: Structure) -> tuple[pandas.DataFrame, str]:
-        """The log with all coordinates of its nodes as columns, and a text that says which nodes
-        unnamed markers are by their places at the start. Raises InputError if one is doubtful."""
-        from tetra_drake.lab.fit.placement import matches
-
+    def _named(self, log: pandas.DataFrame, structure: Structure) -> pandas.DataFrame:
+        """The log with all coordinates of its nodes as columns. Raises InputError for a wrong name
+        in `markers`, and where markers are not as far apart as their nodes."""
         nodes, names = structure.node_names, [*dict.fromkeys(name[:-2] for name in log)]
-        found = {name: self.markers.get(name, name) for name in names}
+        found = [self.markers.get(name, name) for name in names]
         for marker, node in self.markers.items():
-            if node not in nodes or marker not in names or [*found.values()].count(node) > 1:
+            if node not in nodes or marker not in names or found.count(node) > 1:
                 problem = f"found {node}, expected a node of its own for a marker of the log"
                 raise InputError(self.log, f"markers.{marker}", problem)
-        unnamed = [name for name in names if found[name] not in nodes]
         log = log.reindex(columns=_coordinates(names))
-        whole = np.isfinite(_by_node(log)).all(axis=2)
-        used = np.flatnonzero(whole.any(axis=0))
-        row, labels = whole[:, used].all(axis=1).argmax(), [names[place] for place in used]
-        p_WN, seen = node_positions(structure, structure.initial_state), _by_node(log)[row, used]
-        is_seen, choices = len(used) >= MARKERS and whole[row, used].all(), []
-        if unnamed and is_seen and {*unnamed} <= {*labels} and len(used) <= len(nodes):
-            may_be = np.array([np.isin(nodes, found[label]) for label in labels])
-            may_be[~may_be.any(axis=1)] = ~np.isin(nodes, [*found.values()])
-            choices = matches(p_WN, seen, may_be, self.uncertainty)
-        for name in unnamed:
-            places = {nodes[choice[labels.index(name)]] for choice in choices}
-            if len(places) != 1:
-                alike = " or ".join(sorted(places)) or "none"
-                problem = f"is no node; by its place at the start it may be {alike}"
-                raise InputError(self.log, name, f"{problem}; name its node in `markers`")
-            found[name] = places.pop()
-        if is_seen:
-            p_WN = p_WN[[nodes.index(found[label]) for label in labels]]
-            ratio = math.sqrt(seen.var(axis=0).sum() / p_WN.var(axis=0).sum())
+        seen = _by_node(log)
+        whole = np.isfinite(seen).all(axis=2)
+        used = whole.any(axis=0)
+        row = whole[:, used].all(axis=1).argmax()
+        if used.sum() >= MARKERS and whole[row, used].all():
+            p_WN = node_positions(structure, structure.initial_state)
+            p_WN = p_WN[[nodes.index(node) for node in found]][used]
+            ratio = math.sqrt(seen[row, used].var(axis=0).sum() / p_WN.var(axis=0).sum())
             if not 1.0 / ALIKE < ratio < ALIKE:
                 problem = f"found markers {ratio:.3g} times as far apart as their nodes"
                 raise InputError(self.log, "", f"{problem}, expected another unit")
-        note = ", ".join(f"{name} is {found[name]}" for name in unnamed)
-        return log.set_axis(_coordinates([*found.values()]), axis="columns"), note
+        return log.set_axis(_coordinates(found), axis="columns")
 
     def predict(
-        self, scenarios: Sequence[Scenario], *, driver: Driver, log: pandas.DataFrame, note: str
+        self, scenarios: Sequence[Scenario], *, driver: Driver, log: pandas.DataFrame
     ) -> list[Prediction]:
         """Predictions of the coordinates in a log, one Prediction per scenario, by simulation.
 
         `log` is the table of measured coordinates (m), with times (s) as index. `driver` is the
         command or the gait that moves the robot. What settings leave open of the log's clock, its
-        frame and the places of its markers is what fits the log best; `note` is told with it.
+        frame and the places of its markers is what fits the log best.
         """
         often = {"simulation.sample_period": SAMPLE_PERIOD}
         finely = [each.with_numbers(often) for each in scenarios]
         outcomes = simulate_many(finely, [driver] * len(finely), record=True)
-        return [self._prediction(outcome, log, note) for outcome in outcomes]
+        return [self._prediction(outcome, log) for outcome in outcomes]
 
-    def _prediction(self, outcome: Outcome, log: pandas.DataFrame, note: str) -> Prediction:
+    def _prediction(self, outcome: Outcome, log: pandas.DataFrame) -> Prediction:
         from scipy.interpolate import CubicHermiteSpline
         from scipy.optimize import minimize_scalar
         from scipy.spatial.transform import Rotation
@@ -230,16 +228,14 @@ class MotionCapture(Section):
         times, is_there = log.index.to_numpy() - first, np.isfinite(measured)
         whole, offsets = is_there.all(axis=2), np.zeros((0, 3))
         if isinstance(outcome, SimulationFailure):
-            return Prediction(
-                np.full(is_there.sum() + measured[0].size * bool(self.marker_offset), np.nan)
-            )
+            count = is_there.sum() + measured[0].size * bool(self.marker_offset)
+            return Prediction(np.full(count, np.nan))
         moved, structure, names = outcome.trajectory, outcome.robot.structure, log.columns[::3]
         nodes = [structure.node_names.index(name[:-2]) for name in names]
         p, v = (each.values[:, nodes] for each in (moved.p_WN, moved.v_WN))
         curves, end = CubicHermiteSpline(moved.time.values, p, v), float(moved.time[-1])
         is_free = self.origin is self.turn is None and whole.any(axis=0).sum() >= MARKERS
-        turn = Rotation.from_euler("XYZ", self.turn or np.zeros(3)).as_matrix()
-        known = turn, np.array(self.origin or np.zeros(3))
+        known = self.frame()
 
         def placed(shift: float) -> tuple[np.ndarray, Frame]:
             # The robot stands still before and after the simulation.
@@ -259,7 +255,7 @@ class MotionCapture(Section):
             nearest, step = tried[np.argmin([misfit(each) for each in tried])], tried[1] - tried[0]
             bounds = max(nearest - step, low), min(nearest + step, high)
             shift = minimize_scalar(misfit, bounds=bounds, options={"xatol": CLOCK_DIGITS}).x
-        (p, frame), notes = placed(shift), [note] * bool(note)
+        (p, frame), notes = placed(shift), list[str]()
         if self.marker_offset:
             q_WB = moved.q_WB.values[np.searchsorted(curves.x[:-1], times - shift)]
             R_WB = Rotation.from_quat(np.roll(q_WB, -1, axis=2).reshape(-1, 4)).as_matrix()
@@ -281,7 +277,7 @@ class MotionCapture(Section):
         return Prediction(values, float(shift + first), notes)
 
 
-class Rest(Section):
+class Rest(_Placed):
     """Measurement of a robot at rest, for a fit: node coordinates, cable tensions and natural
     frequencies.
 
@@ -343,12 +339,13 @@ class Rest(Section):
             structure, unactuated = robot.structure, Unactuated(robot.model)
             places = [_coordinates(structure.node_names).index(label) for label in self.positions]
             cables = [structure.cable_names.index(label) for label in self.tensions]
-            p_WN = node_positions(structure, rest.state).ravel()[places]
+            turn, origin = self.frame()
+            p = (node_positions(structure, rest.state) @ turn.T + origin).ravel()[places]
             force_at_rest(unactuated, rest.state)
             forces = unactuated.forces.cable_forces[cables, TENSION]
             found = study_equilibrium(robot).frequencies[:modes] if modes else np.zeros(0)
             lacking = np.full(modes - len(found), np.nan)
-            predictions.append(Prediction(np.concatenate([p_WN, forces, found, lacking])))
+            predictions.append(Prediction(np.concatenate([p, forces, found, lacking])))
         return predictions
 
 
@@ -395,8 +392,8 @@ def _by_node(log: pandas.DataFrame) -> np.ndarray:
 
 def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
     """Reads a log file (CSV or Parquet): a table of coordinates (m) with times (s) as index and
-    columns such as "n3 z"; NaN in gaps. Names besides `nodes` need all three coordinates. Raises
-    InputError, naming line or column, if the log is wrong."""
+    columns such as "n3 z"; NaN in gaps. `nodes` are the names that it may have. Raises InputError,
+    naming line or column, if the log is wrong."""
     if path.endswith(".parquet"):
         try:
             stored = pandas.read_parquet(io.BytesIO(read_bytes(path, "log")))
@@ -421,8 +418,9 @@ def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
             expected = f"expected node, axis and unit, such as '{nodes[0]} x_mm'"
             raise InputError(path, name, f"is no column of a log; {expected}")
         coordinate, node, unit = match.groups()
-        if node not in nodes and not {f"{node} {axis}_{unit}" for axis in "xyz"} <= set(cells):
-            raise InputError(path, name, f"found unknown node '{node}'; {hint(node, nodes)}")
+        if node not in nodes:
+            problem = f"found unknown node '{node}'; {hint(node, nodes)}"
+            raise InputError(path, name, f"{problem}; give the node of a marker in `markers`")
         scale = given_quantity(f"1 {unit}", "m", path, name)
         columns[coordinate] = scale * column_numbers(cells[name], path, gaps=True)
         for row in np.flatnonzero(np.abs(columns[coordinate]) > MOST):

@@ -1,4 +1,4 @@
-"""Files of terrain heights, identified by a digest of their content."""
+"""Terrain of heights from a file, which a digest of its content identifies."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 import re
 import tokenize
 import warnings
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from pydantic import Field, PlainValidator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
+from tetra_drake.laws.terrain import Grid, Relief
+from tetra_drake.settings.quantities import Length
 from tetra_drake.settings.refusals import described, refuse
 
 MOST_HEIGHTS = 4_000_000
@@ -98,3 +101,30 @@ def _read_heights(path: str) -> np.ndarray:
         places = re.findall(r" at row \d+(?:, column \d+)?", str(error))
         expected = "expected numbers, equally many in each row"
         refuse("", f"'{path}' cannot be read as heights{''.join(places[-1:])}: {expected}")
+
+
+class HeightField(Relief):
+    """Heights in m from a file: numpy's `.npy`, or text of numbers separated by blanks or commas.
+    Rows are along x and columns along y, ascending; the grid's centre is the origin. There are at
+    least 3 x 3 and at most 4 million heights. A relative path starts in the folder of the scenario
+    file. A record keeps a copy of the file, named by a digest of the heights.
+    """
+
+    file: HeightPath
+    """File of heights in m."""
+    cell: Length = Field(gt=0)
+    """Distance between neighbours, along x and y."""
+
+    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
+        heights = self.file.heights
+        x, y = (-0.5 * (size - 1) * self.cell for size in heights.shape)
+        return Grid(heights, (x, y), (self.cell, self.cell))
+
+    @property
+    def paths(self) -> dict[str, str]:
+        return {"file": self.file.path}
+
+    def save(self, folder: Path) -> None:
+        """Copies the height file to the folder of a record, as heights-DIGEST.npy, named by a
+        digest of the heights."""
+        self.file.save(folder)
