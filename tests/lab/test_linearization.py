@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.anchored import BAR, HUNG, LINE, floating_prism, scenario_of, supported_prism
+from helpers.anchored import HUNG, LINE, TREES, floating_prism, scenario_of, supported_prism
 from helpers.converged import CONVERGED
 from helpers.meshcat_page import read_page
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
@@ -33,22 +33,6 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.systems import SampledController
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
-
-ROPE = {"stiffness": 35.0, "damping": 1.0, "tension": 4.0}
-MAST = {
-    "nodes": {
-        "foot": [0.0, 0.0, 0.0],
-        "top": [0.0, 0.0, 1.0],
-        **{name: [0.5 * c, 0.5 * s, 0.0] for name, c, s in (("e", 1, 0), ("w", -1, 0))},
-        **{name: [0.5 * c, 0.5 * s, 0.0] for name, c, s in (("n", 0, 1), ("s", 0, -1))},
-    },
-    "struts": {"mast": BAR | {"pairs": [["foot", "top"]]}},
-    "masses": {"top": 0.5},
-    "anchors": dict.fromkeys(["foot", "e", "w", "n", "s"], "xyz"),
-    "cables": {"guy": ROPE | {"pairs": [["top", name] for name in "ewns"]}},
-    "actuated": {name: [f"guy {name} top"] for name in "ewns"},
-}
-"""A mast on a ball joint, with a mass on its top and four soft guys: a push topples it."""
 
 
 @functools.cache
@@ -217,7 +201,7 @@ def test_readings_become_states_and_rest_is_their_origin():
 
 
 def test_a_regulator_holds_a_mast_that_topples_without_it_and_does_so_on_the_diagram():
-    scenario = scenario_of(MAST, 2.0)
+    scenario = scenario_of(TREES["mast"], 2.0)
     linear = linearize(scenario)
     cost = np.diag([float(name.endswith(("theta_x", "theta_y"))) for name in linear.states])
     gain = linear.lqr(cost, 1e-3 * np.eye(4))

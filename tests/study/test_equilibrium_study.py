@@ -7,8 +7,7 @@ import re
 import numpy as np
 import pytest
 from helpers import joined
-from helpers.anchored import scenario_of
-from helpers.hanging import HANGING
+from helpers.anchored import TREES, scenario_of
 from helpers.meshcat_page import read_page
 
 from tetra_drake.laws.terrain import Flat
@@ -137,8 +136,8 @@ def test_struts_that_overlap_and_nodes_below_the_ground_are_named():
     assert "pass through" in text
     assert "n0 n4 | " in text
     # A point that hangs 3 mm below the ground, which only `a` can touch.
-    tree = HANGING | {"contacts": ["a"]}
-    lowered = {name: [x, y, z - 0.997] for name, (x, y, z) in HANGING["nodes"].items()}
+    tree = TREES["hanging"] | {"contacts": ["a"]}
+    lowered = {name: [x, y, z - 0.997] for name, (x, y, z) in TREES["hanging"]["nodes"].items()}
     hanging = scenario_of(tree | {"nodes": lowered}).with_sections(terrain=Flat())
     study = study_equilibrium(Robot.of(hanging))
     assert study.nodes["z"].idxmin() == "p"
