@@ -93,9 +93,7 @@ def test_vectors_stay_within_the_bounds_of_a_body_and_come_near_them(prism, kind
 
     optimizer = optimizer_of(kind)(space, prism.evolution, np.random.default_rng(4))
     vectors = np.concatenate(optimise(optimizer, judged, 400)[0])
-    assert np.array_equal(
-        vectors[:, body], vectors[:, body].clip(space.low[body], space.high[body])
-    )
+    assert ((space.low <= vectors) & (vectors <= space.high))[:, body].all()
     best = max(vectors, key=lambda vector: sign * share(vector))
     assert abs(share(best) - 0.5 - 0.5 * sign) < (0.25 if kind == RandomSearch() else 0.1)
     assert np.array_equal(space.vector(space.gait(best, name="best")), best)

@@ -66,15 +66,9 @@ def run_program(folder, call, *, how):
     program = PROGRAM + call
     (folder / "program.py").write_text(program)
     source = {"file": [folder / "program.py"], "stdin": ["-"], "argument": ["-c", program]}[how]
-    return subprocess.run(
-        [sys.executable, *source],
-        input=program if how == "stdin" else None,
-        text=True,
-        capture_output=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-        timeout=300,  # s; a minute is too short beside other work
-        cwd=folder,
-    )
+    options = {"input": program if how == "stdin" else None, "text": True, "cwd": folder}
+    options["env"] = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    return subprocess.run([sys.executable, *source], capture_output=True, timeout=300, **options)
 
 
 @pytest.mark.slow
@@ -85,14 +79,14 @@ def test_a_program_without_guard_is_told(tmp_path):
     assert "InputError" in error and "__main__" in error
 
 
-@pytest.mark.parametrize(
-    ("program", "problem"),
-    [
-        (ModuleType("__main__"), "what is defined interactively"),
-        (PROGRAM_FROM_STDIN, "'<stdin>' is no file"),
-        (None, "define it in a module"),
-    ],
-)
+PROGRAMS = [
+    (ModuleType("__main__"), "what is defined interactively"),
+    (PROGRAM_FROM_STDIN, "'<stdin>' is no file"),
+    (None, "define it in a module"),
+]
+
+
+@pytest.mark.parametrize(("program", "problem"), PROGRAMS)
 def test_gaits_are_evaluated_in_this_process_if_others_cannot_import_the_program(
     program, problem, tmp_path, monkeypatch
 ):
@@ -110,15 +104,11 @@ def test_gaits_are_evaluated_in_this_process_if_others_cannot_import_the_program
     assert len(run.evaluations) == 6 and run.evaluations["fitness"].notna().all()
 
 
+OF_NO_FILE = [("argument", "evolve(objective=objective)", True), ("stdin", "evolve()", True)]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("how", "call", "alone"),
-    [
-        ("argument", "evolve(objective=objective)", True),
-        ("stdin", "evolve()", True),
-        ("argument", "evolve()", False),
-    ],
-)
+@pytest.mark.parametrize(("how", "call", "alone"), [*OF_NO_FILE, ("argument", "evolve()", False)])
 def test_evolution_works_where_processes_cannot_import_the_program(how, call, alone, tmp_path):
     ended = run_program(tmp_path, call, how=how)
     assert ended.stdout == "6 0\n", ended.stderr

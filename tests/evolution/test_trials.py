@@ -22,10 +22,9 @@ def test_trials_differ_and_do_not_depend_on_their_number(run_small):
     two, three = (load_run(run_small(f"{n}", trials=n)).evaluations for n in (2, 3))
     other = load_run(run_small("other", trials=1, seed=6)).evaluations
     assert two.equals(three.query("trial < 2"))
-    first, second = (
-        two.query("trial == @trial")["weight 2->1 extensor"].tolist() for trial in (0, 1)
-    )
-    assert first not in (second, other["weight 2->1 extensor"].tolist())
+    tables = (two.query("trial == 0"), two.query("trial == 1"), other)
+    first, *others = (table["weight 2->1 extensor"].tolist() for table in tables)
+    assert first not in others
 
 
 @pytest.mark.parametrize("report", [{"mean_fitness": "wide"}, {"stop": 3}, {"spread": object}])

@@ -1,11 +1,11 @@
 """Small motions about rest against analysis, statics and the engines; LQR."""
 
+import copy
 import dataclasses
 import functools
 import json
 import math
 import re
-from typing import Any
 
 import numpy as np
 import pytest
@@ -50,9 +50,8 @@ def test_without_damping_the_oscillations_are_those_of_stiffness_and_mass():
     assert modes.frequencies == pytest.approx(study.frequencies, rel=1e-7)
     assert modes.damping_ratios == pytest.approx(np.zeros(9), abs=1e-7)
     alone = np.flatnonzero(np.diff(study.frequencies, prepend=0, append=1e3)[:-1] > 0.1)[-1]
-    assert abs(np.vdot(modes.shapes[alone], study.modes[alone])) == pytest.approx(
-        np.linalg.norm(study.modes[alone]) ** 2, rel=1e-5
-    )
+    overlap = abs(np.vdot(modes.shapes[alone], study.modes[alone]))
+    assert overlap == pytest.approx(np.linalg.norm(study.modes[alone]) ** 2, rel=1e-5)
 
 
 def test_a_weight_on_a_damped_cable_bounces_as_a_damped_oscillator():
@@ -66,14 +65,11 @@ def test_a_weight_on_a_damped_cable_bounces_as_a_damped_oscillator():
     assert modes.damping_ratios[bounces] == pytest.approx(ratio, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("scenario", "speed"),
-    [
-        (supported_prism(), 0.01),
-        (load_scenario("prism"), 2e-4),  # the loaded nodes stick, and touch the ground all the time
-    ],
-    ids=["on supports", "on the ground"],
-)
+# On the ground the loaded nodes stick, and touch it all the time.
+PUSHED = {"on supports": (supported_prism(), 0.01), "on ground": (load_scenario("prism"), 2e-4)}
+
+
+@pytest.mark.parametrize(("scenario", "speed"), PUSHED.values(), ids=PUSHED)
 def test_a_small_push_moves_the_robot_as_the_linear_system(scenario, speed):
     # The displacements stay below a thousandth of the size.
     scenario = scenario.with_sections(engine=CONVERGED["compiled"])
@@ -177,16 +173,13 @@ def test_a_winch_follows_its_command_with_its_lag():
 def test_states_inputs_and_outputs_have_names_and_drake_takes_the_system():
     linear = linearize("prism", outputs=["normal_forces", "v_WN"])
     assert isinstance(linear.system, LinearSystem)
-    assert linear.states[:6] == (
-        *("n0 n4 theta_x", "n0 n4 theta_y", "n0 n4 theta_z"),
-        *("n0 n4 x", "n0 n4 y", "n0 n4 z"),
-    )
+    first = [f"n0 n4 {name}" for name in ("theta_x", "theta_y", "theta_z", "x", "y", "z")]
+    assert [*linear.states[:6]] == first
     assert linear.states[18] == "n0 n4 w_x" and linear.inputs[0] == "side n0 n3"
     assert {*linear.outputs[:6]} == {f"load n{i}" for i in range(6)}
     at = linear.outputs.index("n4 v_z"), linear.states.index("n0 n4 v_z")
     assert linear.system.C()[at] == pytest.approx(1.0)
-    diagram_port = linear.system.get_input_port().size(), linear.system.get_output_port().size()
-    assert diagram_port == (6, 6 + 18)
+    assert linear.system.get_output_port().size() == 6 + 18
 
 
 def test_readings_become_states_and_rest_is_their_origin():
@@ -242,10 +235,8 @@ def test_a_regulator_holds_a_mast_that_topples_without_it_and_does_so_on_the_dia
 def test_a_regulator_damps_a_floating_robot_and_lets_it_drift():
     linear = linearize(floating_prism())
     gain = linear.lqr(np.diag(np.repeat([1.0, 0.01], 18)), 1e-4 * np.eye(6))
-    alone, together = (
-        np.linalg.eigvals(matrix)
-        for matrix in (linear.system.A(), linear.system.A() - linear.system.B() @ gain)
-    )
+    A, B = linear.system.A(), linear.system.B()
+    alone, together = (np.linalg.eigvals(matrix) for matrix in (A, A - B @ gain))
     assert np.count_nonzero(np.abs(together) < 0.3) == 18, "twice 6 motions and 3 spins"
     slowest = [roots[np.abs(roots) > 0.3].real.max() for roots in (alone, together)]
     assert slowest[1] < 2.0 * slowest[0] < 0.0
@@ -257,19 +248,11 @@ def test_a_regulator_damps_the_slow_swing_of_a_load_on_a_long_rope():
     # m x'' = -s x + f with the costs 1 of x and its rate, and r of f. Riccati's equation gives the
     # gains k = sqrt(s² + 1 / r) - s and c = sqrt(2 m k + 1 / r).
     long, mass, cost = 150.0, 500.0, 1e-4
-    rope = {"stiffness": 1e5, "damping": 100.0, "tension": mass * 9.80665}
-    guy = {"stiffness": 1.0, "damping": 0.0, "tension": 1.0}
-    tree: dict[str, Any] = {
-        "nodes": {"hook": [0, 0, long], "load": [0, 0, 0], "x": [60, 0, 0], "y": [0, 60, 0]},
-        "masses": {"load": mass},
-        "cables": {
-            "rope": rope | {"pairs": [["hook", "load"]]},
-            "guy": guy | {"pairs": [["load", "x"], ["load", "y"]]},
-        },
-        "anchors": dict.fromkeys(["hook", "x", "y"], "xyz"),
-        "actuated": {"x": ["guy load x"], "y": ["guy load y"]},
-    }
+    tree = copy.deepcopy(TREES["load"])
+    tree["nodes"]["hook"], tree["masses"]["load"] = [0, 0, long], mass
+    tree["cables"]["rope"]["tension"] = mass * 9.80665
     linear = linearize(scenario_of(tree))
+
     gain = linear.lqr(np.eye(12), cost * np.eye(2))
     spring = mass * -linear.system.A()[9, 3]  # with the guys, which are soft
     assert spring == pytest.approx(mass * 9.80665 / long + 1.0, rel=0.01)
@@ -279,9 +262,8 @@ def test_a_regulator_damps_the_slow_swing_of_a_load_on_a_long_rope():
     swing = math.sqrt(spring / mass) / math.tau
     assert linear.modes().frequencies[:2] == pytest.approx([swing, swing], rel=0.01)
     # One guy cannot hold the swing across it.
-    tree["cables"]["guy"] = guy | {"pairs": [["load", "x"]]}
-    tree |= {"anchors": dict.fromkeys(["hook", "x"], "xyz"), "actuated": {"x": ["guy load x"]}}
-    del tree["nodes"]["y"]
+    del tree["nodes"]["y"], tree["anchors"]["y"], tree["actuated"]["y"]
+    tree["cables"]["guy"]["pairs"].pop()
     with pytest.raises(InputError, match="lqr"):
         linearize(scenario_of(tree)).lqr(np.eye(12), [[cost]])
 

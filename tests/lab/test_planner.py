@@ -43,7 +43,7 @@ def test_a_plan_comes_near_the_best_one_that_is_known(hung, engine, delayed):
     first = result.trajectory.signal.sel(time=slice(0.0, 0.009)).values
     assert np.abs(first).max() < 1e-9 if delayed else first.max() > 0.1
     assert planner.decisions == 10 and planner.decisions_per_second > 0.0
-    assert 0.0 <= planner.deadlines_kept <= 1.0 and "10 decisions" in str(planner)
+    assert 0.0 <= planner.deadlines_kept <= 1.0
     again = simulate(plant, controller=planner, control_period=0.01)
     assert again.metrics.distance == result.metrics.distance and planner.decisions == 10
 
