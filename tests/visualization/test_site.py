@@ -25,6 +25,7 @@ from .conftest import opened
 CHECKOUT = Path(__file__).parents[2]
 SITE = CHECKOUT / "diagrams/site"
 PHONE, DESK = (360, 720), (1280, 800)
+READ = ("index", "api", "runs/index", "runs/thesis/THESIS", "tetra_drake/scenario/KEYS")
 
 WORDS = yaml.safe_load(Path(__file__).with_name("site_words.yaml").read_text("utf-8"))
 
