@@ -67,9 +67,7 @@ QUICK = {"reevaluate": False, "report": False}
 @pytest.mark.parametrize(
     "make", [ThreadPoolExecutor, pytest.param(WorkerProcesses, marks=pytest.mark.slow)]
 )
-def test_a_run_is_evolved_checked_on_the_diagram_and_reported(
-    make, tiny, tmp_path, reports, monkeypatch
-):
+def test_a_run_is_evolved_and_checked(make, tiny, tmp_path, reports, monkeypatch):
     """With threads in place of worker processes, and with these."""
     progress, made = MagicMock(spec=Progress), MagicMock(wraps=make)
     monkeypatch.setattr("tetra_drake.evolution.evaluators.WorkerProcesses", made)
@@ -93,6 +91,7 @@ def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
     for scenario, problem in (
         (tiny.with_changes({"engine": "!Drake", "terrain": step}), "below the ground"),
         (tiny.with_changes({"evolution.evaluations": 3}), "evolution.evaluations: .*4"),
+        (None, "is needed"),
     ):
         with pytest.raises(InputError, match=problem):
             tetra_drake.evolve(scenario, tmp_path / "run")

@@ -85,9 +85,7 @@ NAMES |= {"MODE_COLUMNS": MODE_COLUMNS, "MakeTensegrityDiagram": diagram}
 
 
 @pytest.mark.parametrize(("call", "source", "key", "words"), [(*row[:3], row[3:]) for row in ROWS])
-def test_a_call_is_refused_in_a_line_and_leaves_nothing(
-    call, source, key, words, tmp_path, monkeypatch, refused
-):
+def test_of_a_call(call, source, key, words, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
     with refused(source, key, *words):
         eval(call, dict(NAMES))

@@ -60,7 +60,7 @@ def test_a_body_with_equal_bounds_changes_no_fitness(tmp_path, prism, kind):
     assert first == second and len(set(first)) == 12
 
 
-@pytest.mark.parametrize("kind", ALL)
+@pytest.mark.parametrize("kind", LEARNING)
 def test_a_stiffness_is_found_whose_best_is_known(tmp_path, kind):
     """A bar hangs its weight over the stiffness below the free length of its cable."""
     changes = {"cpg.start_up": "1 s", "simulation.steady_from": "0.01 s", "optimizer": kind}

@@ -87,7 +87,7 @@ PROGRAMS = [
 
 
 @pytest.mark.parametrize(("program", "problem"), PROGRAMS)
-def test_gaits_are_evaluated_in_this_process_if_others_cannot_import_the_program(
+def test_gaits_are_evaluated_here_if_others_cannot_import_it(
     program, problem, tmp_path, monkeypatch
 ):
     def objective(result):

@@ -8,9 +8,7 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Evaluation, Iteration
 
 
-def test_neither_workers_nor_executor_nor_timing_change_the_record(
-    run_small, tmp_path, one_process
-):
+def test_neither_workers_nor_timing_change_the_record(run_small, tmp_path, one_process):
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
     process = on_executor(Bowl(), one_process, 1)  # it is replaced on the way

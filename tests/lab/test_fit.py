@@ -73,9 +73,7 @@ def by_formula(monkeypatch):
     monkeypatch.setattr(Rest, "predict", predict)
 
 
-def test_exact_measurements_give_the_hidden_constants_and_the_intervals_of_a_straight_line(
-    by_formula,
-):
+def test_exact_measurements_give_the_constants_and_intervals_of_a_line(by_formula):
     found = fit_values(hung(), pulled_down(), BOUNDS)
     assert found.parameters["value"].to_list() == pytest.approx([210.0, 0.39], rel=1e-5)
     assert found.warnings == []
@@ -91,9 +89,7 @@ def test_exact_measurements_give_the_hidden_constants_and_the_intervals_of_a_str
     assert (fitted.stiffness, fitted.free_length) == tuple(found.parameters["value"])
 
 
-def test_two_values_that_are_known_but_hardly_apart_are_named_together_and_alike_ones_unknown(
-    by_formula,
-):
+def test_two_values_hardly_apart_are_named_together_and_alike_ones_unknown(by_formula):
     found = fit_values(hung(), pulled_down()[:2], BOUNDS)
     assert found.correlations.loc[STIFFNESS, FREE_LENGTH] > 0.95
     assert found.parameters["determined"].all()
@@ -358,9 +354,7 @@ def test_the_offset_of_a_marker_is_found_in_the_axes_of_its_body(lab, truth, tmp
     assert abs(values - without.numbers["measured"]).max() > 1e-3
 
 
-def test_markers_are_named_by_their_nodes_or_refused_with_the_key_for_it(
-    lab, truth, tmp_path, refused
-):
+def test_markers_are_named_by_their_nodes_or_refused(lab, truth, tmp_path, refused):
     file, names = tmp_path / "log.csv", [f"M{number}" for number in range(6)]
     named = seen_by_cameras(tmp_path / "named.csv", lab, **TURNED).read(truth, "")
     with refused(file, "M0 x_mm", "n0", "markers"):

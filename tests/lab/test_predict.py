@@ -144,13 +144,13 @@ def test_draws_are_simulated_with_a_gait():
     scenario = load_scenario("prism").with_changes(changes)
     measures = {"way": "distance", "own": lambda result: result.metrics.distance}
     gait = td.seeded_gait(scenario, 1)
-    draws = predict(scenario, measures, gait=gait, draws=8).draws
-    assert draws["way"].nunique() == 8 and draws["way"].equals(draws["own"])
+    draws = predict(scenario, measures, gait=gait, draws=4).draws
+    assert draws["way"].nunique() == 4 and draws["way"].equals(draws["own"])
     # Quantities in motion and at rest together are those of each kind alone.
     at_rest = ["frequency 1", "n3 z"]
-    both = predict(scenario, ["distance", *at_rest], gait=gait, draws=8).draws
+    both = predict(scenario, ["distance", *at_rest], gait=gait, draws=4).draws
     assert both["distance"].equals(draws["way"].rename("distance"))
-    alone = predict(scenario, at_rest, draws=8).draws
+    alone = predict(scenario, at_rest, draws=4).draws
     np.testing.assert_allclose(both[at_rest], alone[at_rest], rtol=1e-6)
 
 

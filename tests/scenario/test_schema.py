@@ -56,7 +56,7 @@ def damage(tree: Any, draw: random.Random) -> None:
 
 @pytest.mark.parametrize("draws", [50, pytest.param(250, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("structure", [True, False])
-def test_what_a_schema_refuses_does_not_load_and_most_of_the_rest_loads(
+def test_a_schema_refuses_most_of_what_does_not_load(
     structure: bool, draws: int, tmp_path: Path
 ) -> None:
     kind, texts, load = "scenario", SCENARIO_TEXTS, load_scenario
