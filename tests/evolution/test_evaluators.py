@@ -5,9 +5,11 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 from types import ModuleType
 
 import pytest
+import yaml
 from helpers import analytic
 from helpers.converged import shortly
 
@@ -39,31 +41,14 @@ def test_a_function_that_workers_cannot_load_is_told(tasks, monkeypatch, capfd, 
     assert "only one process can load this" in capfd.readouterr().err
 
 
-PROGRAM = """
-import numpy as np
-import tetra_drake
-from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
-from helpers.analytic import Bowl, evaluated, small_scenario, tasks_of
-def objective(result):
-    return result.metrics.twist
-def evolve(**options):
-    times = {"simulation.duration": "20 ms", "simulation.steady_from": "10 ms"}
-    small = small_scenario(oscillators=2, population=4, iterations=1, trials=1)
-    options |= {"workers": 2, "reevaluate": False, "report": False}
-    run = tetra_drake.evolve(small.with_changes(times), "run", **options)
-    print(len(run.evaluations), run.statuses[0].failures)
-"""
+PROGRAM = yaml.safe_load(Path(__file__).with_name("program.yaml").read_text("utf-8"))
 PROGRAM_FROM_STDIN = ModuleType("__main__")
 PROGRAM_FROM_STDIN.__file__ = "<stdin>"
-EVALUATE = """
-with on_executor(Bowl(), WorkerProcesses, 1) as processes:
-    print(evaluated(processes, tasks_of(np.ones((1, 26)))))
-"""
 
 
 def run_program(folder, call, *, how):
     """A program that is a file, read from standard input or given by -c, as it has ended."""
-    program = PROGRAM + call
+    program = PROGRAM["program"] + call
     (folder / "program.py").write_text(program)
     source = {"file": [folder / "program.py"], "stdin": ["-"], "argument": ["-c", program]}[how]
     options = {"input": program if how == "stdin" else None, "text": True, "cwd": folder}
@@ -73,7 +58,7 @@ def run_program(folder, call, *, how):
 
 @pytest.mark.slow
 def test_a_program_without_guard_is_told(tmp_path):
-    ended = run_program(tmp_path, EVALUATE, how="file")
+    ended = run_program(tmp_path, PROGRAM["evaluate"], how="file")
     assert ended.returncode == 1 and ended.stdout == ""
     error = ended.stderr.splitlines()[-1]
     assert "InputError" in error and "__main__" in error

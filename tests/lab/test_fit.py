@@ -10,6 +10,7 @@ from unittest.mock import Mock
 import numpy as np
 import pandas
 import pytest
+import yaml
 from helpers.anchored import HUNG, scenario_of, supported_prism
 from helpers.converged import shortly
 from scipy.spatial.transform import Rotation
@@ -411,18 +412,10 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
     assert (out / "residuals.figure.svg").stat().st_size > 1000
 
 
-@pytest.mark.parametrize(
-    ("log", "named"),
-    [
-        ("time_s,n9 z_mm\n0,1\n", "n9 z_mm"),
-        ("time,n3 z_mm\n0,1\n", "time_s"),
-        ("time_s,n3 z_mm\n0,1\n2,1\n1,1\n", "line 4, time_s"),
-        ("time_s,n3 z_mm\n0,1\n,1\n", "line 3, time_s"),
-        ("time_s,n3 z_mm\n0,1\n9,1\n", "time_s"),
-        ("time_s,n3 z_mm\n0,1\n1,1\n", "time_s"),  # the command takes 1.45 s
-        ("time_s,n3 z_mm\n12.3,1\n13.8,1\n", "time_s"),  # clocks differ by 0.1 s at most
-    ],
-)
+LOGS = yaml.safe_load(Path(__file__).with_name("logs.yaml").read_text("utf-8"))
+
+
+@pytest.mark.parametrize(("log", "named"), LOGS)
 def test_a_log_that_does_not_fit_is_refused(log, named, lab, tmp_path, refused):
     file = tmp_path / "log.csv"
     file.write_text(log)

@@ -111,7 +111,7 @@ def test_a_longer_bar_keeps_what_anchors_hold(anchors):
 
 
 def test_a_tolerance_in_a_text_is_one_of_the_section_and_is_kept():
-    given = {"robot.cables.side.stiffness": "110 N/m ± 2 % uniform"}
+    given = {"robot.cables.side.stiffness": "1.1·10² N·m⁻¹ ± 2 % uniform"}
     given |= {"ground.stiffness": "9 kN/m +/- 1 kN/m"}
     scenario = load_scenario("prism").with_changes(given)
     assert scenario.robot.tolerances["cables.side.stiffness"].law == "uniform"

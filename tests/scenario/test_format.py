@@ -1,7 +1,10 @@
 """Structure files of format 1: routed cables, joints, pinned nodes and rigid bodies."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import yaml
 from helpers.files import CRANE, structure_of
 
 from tetra_drake.robot.structure import Structure
@@ -10,6 +13,8 @@ from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import STRUCTURES
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import parse_yaml
+
+PINNED = yaml.safe_load(Path(__file__).with_name("pinned.yaml").read_text("utf-8"))
 
 
 def test_the_example_has_what_its_page_says() -> None:
@@ -49,18 +54,7 @@ def test_a_written_scenario_has_joints_in_place_of_pins_and_loads_as_the_same(tm
     assert turned.robot.blueprint().groups == ((2,),)
 
 
-@pytest.mark.parametrize(
-    ("changes", "bodies"),
-    [
-        ("", ["l u", "u-2 r", "r-2 d", "d-2 l-2", "post"]),
-        ("pinned: [l, r]\ncables: {long: {pairs: [[l, d]]}}", ["l u r", "r-2 d l-2", "post"]),
-        ("nodes: {l-2: [0, 0, 9]}", ["l u", "u-2 r", "r-2 d", "d-2 l-3", "post"]),
-        ("bodies: {v: {struts: [bar u l, bar r d]}}\ncables: {cross: {pairs: [[t, l], [t, d]]}}",
-         ["v", "u-2 r", "d-2 l-2", "post"]),
-        ("bodies: {v: {struts: [post], nodes: [u]}}", ["l u", "u-2 r", "r-2 d", "d-2 l-2", "v"]),
-        ("bodies: {v: {struts: [bar d l]}}", ["l u", "u-2 r", "r-2 d", "v", "post"]),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("changes", "bodies"), PINNED)
 def test_pinned_nodes_part_the_bodies_that_share_nothing_else(changes, bodies) -> None:
     blueprint = structure_of("frame", changes).blueprint()
     assert [*blueprint.bodies] == bodies

@@ -27,35 +27,9 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_scenario_holds_what_its_file_holds(folder: Path) -> None:
-    scenario = load(folder, "!Structure {file: own.yaml}")
-    assert scenario.robot == read_structure(folder / "own.yaml")
-    assert (scenario.robot.body_count, scenario.oscillators) == (3, 2)
-    assert scenario.robot.size == approx(0.1)
-
-
 @pytest.mark.parametrize("name", shipped_structures())
 def test_a_shipped_scenario_has_the_shipped_structure(name: str) -> None:
     assert load_scenario(name).robot == read_structure(name)
-
-
-def test_what_stands_beside_the_file_overrides_it(folder: Path) -> None:
-    robot = """!Structure
-      file: own.yaml
-      nodes: {d: [3, 2, 5]}
-      cables: {side: {stiffness: 50 N/m}, long: {tension: null, free_length: 5 cm}}
-      actuated: {both: [side b d, side c d]}
-      contacts: [a]
-      offsets: [[0, 0, 1 mm], [0, 0, 0], [0, 0, 0]]
-    """
-    given = load(folder, robot).robot
-    assert given.nodes["d"] == approx([0.03, 0.02, 0.05])
-    side, long = given.cables["side"], given.cables["long"]
-    assert (side.stiffness, side.damping, long.free_length) == (50.0, 3.0, 0.05)
-    blueprint = given.blueprint()
-    assert (blueprint.oscillators, blueprint.groups) == (("both",), ((0, 1),))
-    assert [blueprint.node_names[node] for node in blueprint.contacts] == ["a"]
-    assert blueprint.offsets[0].tolist() == [0.0, 0.0, 0.001]
 
 
 def test_another_file_replaces_the_structure_of_the_base(folder: Path) -> None:
@@ -71,6 +45,8 @@ def test_another_file_replaces_the_structure_of_the_base(folder: Path) -> None:
 def test_python_names_and_changes_structures_as_a_file_does(folder: Path) -> None:
     scenario = load(folder, "!Structure {file: own.yaml}")
     file = str(folder / "own.yaml")
+    assert scenario.robot == read_structure(file)
+    assert (scenario.robot.body_count, scenario.robot.size) == (3, approx(0.1))
     changes = {"objective": {"speed": "1 s/m"}, "name": "mine"}
     for robot in ({"robot.file": file}, {"robot": read_structure(file)}):
         assert load_scenario("thesis").with_changes(changes | robot) == scenario

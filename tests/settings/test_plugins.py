@@ -22,34 +22,8 @@ from tetra_drake.settings.refusals import TAG
 from tetra_drake.settings.section import Kinds, Section, parts_in
 
 SCENARIO = DATA / "scenarios/all_added.yaml"
+PROGRAMS = yaml.safe_load(Path(__file__).with_name("programs.yaml").read_text("utf-8"))
 TAGS = ["Scaled", "Viscous", "Waves", "Servo", "Sine", "HillClimb"]
-
-USE = """\
-import json, pickle, sys
-from concurrent.futures import ThreadPoolExecutor
-import tetra_drake.cli, tetra_drake.experiment
-from tetra_drake.settings.plugins import entries
-searches = entries.cache_info().misses
-import tetra_drake as td
-from tetra_drake.report.result_folder import save_result
-from tetra_drake.scenario.keys import keys_page, schema_text
-from tetra_drake.scenario.structure_files import read_structure
-
-if __name__ == "__main__":
-    scenario = td.load_scenario(sys.argv[1])
-    save_result("result.json", td.simulate(scenario, td.seeded_gait(scenario)))
-    quick = {"report": False, "reevaluate": False}
-    run = td.evolve(scenario, "run", executor=ThreadPoolExecutor, workers=1, **quick)
-    print(json.dumps({
-        "searches by imports": searches,
-        "page": keys_page(),
-        "schema": schema_text(),
-        "bodies": read_structure("hanging_bar").blueprint().bodies,
-        "read back": td.load_run("run").scenario == scenario,
-        "evaluations": len(run.evaluations),
-        "pickled": pickle.loads(pickle.dumps(scenario)) == scenario,
-    }))
-"""
 
 
 def run_with(site: Path, folder: Path, program: str, *, jit: bool = False) -> dict:
@@ -69,10 +43,10 @@ def run_with(site: Path, folder: Path, program: str, *, jit: bool = False) -> di
 
 @pytest.fixture(scope="module")
 def used(tmp_path_factory) -> tuple[Path, dict[str, Any]]:
-    """The folder in which USE has run, and what it printed."""
+    """The folder in which the first program has run, and what it printed."""
     folder = tmp_path_factory.mktemp("used")
     install_example(folder / "site")
-    return folder, run_with(folder / "site", folder, USE)
+    return folder, run_with(folder / "site", folder, PROGRAMS["use"])
 
 
 def test_a_plugin_adds_one_of_each_and_records_name_it(used):
@@ -172,24 +146,10 @@ def test_plugins_are_not_searched_by_an_import(used):
     assert used[1]["searches by imports"] == 0
 
 
-COMPARE = """\
-import json, sys
-import tetra_drake as td
-
-if __name__ == "__main__":
-    scenario = td.load_scenario(sys.argv[1]).with_changes({"simulation.duration": "0.5 s"})
-    gait = td.seeded_gait(scenario)
-    results = [td.simulate(scenario.on_engine(name), gait) for name in ("drake", "compiled")]
-    run = td.evolve(td.load_scenario(sys.argv[1]), "run", workers=1, report=False)
-    metrics = [result.metrics.to_json() for result in results]
-    print(json.dumps([*metrics, len(run.evaluations)]))
-"""
-
-
 @pytest.mark.slow
 def test_laws_of_a_plugin_are_compiled_for_every_engine(tmp_path):
     install_example(tmp_path / "site")
-    drake, lanes, evaluations = run_with(tmp_path / "site", tmp_path, COMPARE, jit=True)
+    drake, lanes, evaluations = run_with(tmp_path / "site", tmp_path, PROGRAMS["compare"], jit=True)
     assert evaluations == 2, "in a worker process"
     for name in ("distance", "tension", "peak_actuator_force"):
         assert lanes[name] == pytest.approx(drake[name], rel=0.02), name

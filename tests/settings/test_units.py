@@ -5,9 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tetra_drake.lab.predict.variates import deviation
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.settings.quantities import Quantity
 from tetra_drake.settings.units import SYSTEMS, plainest, quantity_to_si, shown_in
 
 # Exact by definition: the international inch, the avoirdupois pound (0.45359237 kg) and
@@ -67,11 +65,3 @@ def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, 
         assert each.units == SYSTEMS[expected]
     with shown_in("SI"):
         assert scenario.units == SYSTEMS["SI"]
-
-
-def test_signs_are_read_with_tolerances_too():
-    given = {"density": "2.7·10³ kg·m⁻³ ± 1 %", "strut_diameter": "3000 µm ± 5 µm"}
-    robot = load_scenario().with_changes({"robot": given}).robot
-    assert (robot.density, robot.strut_diameter) == pytest.approx((2700.0, 3e-3))
-    assert deviation(robot.tolerances["strut_diameter"], Quantity(3e-3, "m")) == pytest.approx(5e-6)
-    assert robot.tolerances.keys() == {"density", "strut_diameter"}
