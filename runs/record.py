@@ -77,7 +77,12 @@ class Experiment:
     def scenario(self, name: str) -> Scenario:
         """Scenario of the run of this name."""
         base = load_scenario(self.base).on_engine(self.engine)
-        return base.with_changes({"name": name} | dict(self.changes))
+        step = {} if "engine" in self.changes else _STEP
+        return base.with_changes({"name": name} | step | dict(self.changes))
+
+
+_STEP = {"engine.max_step": "3 ms"}
+"""The longest step of recorded runs, also where damping is light."""
 
 
 _SOUND = {"require": {"clearance": "0.125 in", "tension": 0.0}}
