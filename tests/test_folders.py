@@ -47,7 +47,7 @@ def written(tmp_path_factory) -> Path:
         for name, command in WRITERS.items():
             assert main([*command.split(), "--out", name]) == 0, command
     (folder / "heights.txt").unlink()  # what is written needs no other file
-    return folder.rename(folder.with_name("moved"))
+    return folder.rename(f"{folder}_moved")
 
 
 @pytest.mark.parametrize("writer", WRITERS)
