@@ -1,4 +1,7 @@
-"""Arguments of Python functions that are refused, with their names and what was found."""
+"""Arguments of Python functions that are refused, with their names and what was found.
+
+A refused call leaves no file.
+"""
 
 import functools
 import math
