@@ -46,16 +46,6 @@ def test_the_new_names_of_the_upgrading_page_exist():
         importlib.import_module(name)
 
 
-@pytest.mark.parametrize("form", ["bug", "idea"])
-def test_a_form_for_issues_has_what_github_asks_for(form):
-    content = yaml.safe_load(read(f".github/ISSUE_TEMPLATE/{form}.yml"))
-    assert {"name", "description", "body"} <= content.keys()
-    for field in content["body"]:
-        assert field["type"] in ("textarea", "dropdown") and field["attributes"]["label"]
-    names = [field["id"] for field in content["body"]]
-    assert len(set(names)) == len(names)
-
-
 @pytest.fixture
 def readme(monkeypatch):
     """The module package_readme, away from GitHub's workflows."""
