@@ -21,10 +21,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import jinja2
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from page import rendered
 from records import append, read
 
 from tetra_drake.engines.queue import SimulationQueue
@@ -32,8 +32,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import write_whole
-from tetra_drake.formatting import TextTable, fixed
+from tetra_drake.files import read_text, write_whole
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.lab.planner import Planner
 from tetra_drake.machine import available_cores
@@ -45,6 +44,7 @@ from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.yaml_text import parse_yaml
 from tetra_drake.study.statistics import (
     interquartile_mean,
     interval,
@@ -53,7 +53,7 @@ from tetra_drake.study.statistics import (
 )
 
 HERE = Path(__file__).parent / "bench"
-TEMPLATE, ENTRIES = HERE.parent / "bench.md.jinja", HERE / "entries"
+ENTRIES, FILE = HERE / "entries", HERE / "tasks.yaml"
 RECORDS, PAGE_NAME, FIGURE = "records.jsonl", "README.md", "scores"
 SEEDS, EPISODES = 10, 250
 """Number of solutions of each entry to each task, and the budget of one in episodes."""
@@ -69,29 +69,23 @@ Record: TypeAlias = dict[str, Any]
 task and entry also has the score on the second engine."""
 
 
-def relative_speed(result: SimulationResult) -> float:
-    """Speed of the centre along x in body lengths per second."""
-    return result.metrics.relative_speed
-
-
-def turning_rate(result: SimulationResult) -> float:
-    """Mean rate of the heading in degrees per second, left positive."""
-    duration = result.scenario.simulation.duration
-    return math.degrees(result.metrics.heading_change) / duration
-
-
 def efficiency(result: SimulationResult) -> float:
     """Inverse of the cost of transport; 0 for robots slower than LEAST_SPEED."""
     metrics = result.metrics
     return 1.0 / metrics.cost_of_transport if metrics.relative_speed >= LEAST_SPEED else 0.0
 
 
+SCORES: Mapping[str, Callable[[SimulationResult], float]] = {
+    "speed": lambda result: result.metrics.relative_speed,
+    "turning rate": lambda result: (
+        math.degrees(result.metrics.heading_change) / result.scenario.simulation.duration
+    ),
+    "efficiency": efficiency,
+}
+"""Scores of motions: speed of the centre along x in body lengths/s; mean rate of the heading in
+degrees/s, left positive; inverse of the cost of transport."""
 MUJOCO = {"engine": "!Mujoco", "friction.stiffness": "0 N/m"}
-"""Changes for a second engine: MuJoCo, which has no bristles."""
-DIAGRAM = {"engine": "!Drake"}
-"""Changes for a second engine: Drake's, for terrains that MuJoCo does not have here."""
-PAYLOAD = "25 g"
-"""Payload of each tetrahedron, which has 20 g itself."""
+"""Changes for the second engine, where a task names none: MuJoCo, which has no bristles."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +97,8 @@ class Task:
     base: str
     """Name of a shipped scenario."""
     changes: Mapping[str, Any] = field(default_factory=dict)
-    score: Callable[[SimulationResult], float] = relative_speed
+    score: str = "speed"
+    """Name of its score, see SCORES."""
     unit: str = "body lengths/s"
     second: Mapping[str, Any] = field(default_factory=lambda: MUJOCO)
     """Changes of the scenario for the second engine."""
@@ -116,57 +111,19 @@ class Task:
 
     def scored(self, solution: Solution, *, changes: Mapping[str, Any] | None = None) -> float:
         """Score of a solution on the task's scenario, with `changes`; 0 if the simulation fails."""
-        scenario = self.scenario.with_changes(changes or {})
+        scenario, score = self.scenario.with_changes(changes or {}), SCORES[self.score]
         try:
             if callable(solution):
-                return self.score(simulate(scenario, controller=solution))
+                return score(simulate(scenario, controller=solution))
             gait = ParameterSpace.of(scenario).gait(np.asarray(solution), name=self.name)
-            return self.score(simulate(scenario, gait))
+            return score(simulate(scenario, gait))
         except SimulationFailure:
             return 0.0
 
 
-TASKS = (
-    Task("walk", "the thesis's robot walks", "coulomb"),
-    Task("climb", "up 10 degrees", "incline", {"terrain": "!Incline {slope: 10 deg}"}),
-    Task("rough", "over rough ground", "rough", second=DIAGRAM),
-    Task(
-        "turn",
-        "a robot with left and right oscillators turns to the left",
-        "turning",
-        {"simulation.duration": "15 s"},
-        turning_rate,
-        "deg/s",
-    ),
-    Task(
-        "payload",
-        f"{PAYLOAD} on each tetrahedron of 20 g",
-        "coulomb",
-        {"robot.payload": [PAYLOAD] * 5},
-    ),
-    Task(
-        "damage",
-        "a driven cable breaks after 5 s; the speed after 6 s counts",
-        "coulomb",
-        {
-            "events": [{"at": "5 s", "cut": ["T4-T5 outer bottom_left"]}],
-            "simulation.steady_from": "6 s",
-        },
-    ),
-    Task(
-        "efficient",
-        f"little work for the way, at {LEAST_SPEED} body lengths/s or more",
-        "coulomb",
-        score=efficiency,
-        unit="1 / cost of transport",
-    ),
-    Task(
-        "roll",
-        "a six-bar rover rolls by a policy",
-        "rolling",
-        {"disturbances": None, "simulation.steady_from": "2 s"},
-    ),
-)
+TASKS = [
+    Task(name, **task) for name, task in parse_yaml(read_text(FILE, "tasks"), "tasks.yaml").items()
+]
 
 
 class Problem:
@@ -188,7 +145,7 @@ class Problem:
         self.space = ParameterSpace.of(self.scenario)
         self._duration = self.scenario.simulation.duration
         self.left = self.budget = episodes * self._duration
-        self._evaluation = GaitEvaluation(self.scenario, task.score)
+        self._evaluation = GaitEvaluation(self.scenario, SCORES[task.score])
 
     def evaluate(self, vectors: Sequence[Vector]) -> list[Evaluation]:
         """Evaluations of parameter vectors, one episode each. `fitness` is the score; -inf for a
@@ -338,66 +295,6 @@ def entry_names(records: Sequence[Record]) -> list[str]:
     )
 
 
-def task_table(records: Sequence[Record]) -> TextTable:
-    """Interquartile means of the scores, with their intervals, by task and entry."""
-    names, found = entry_names(records), scores(records)
-    rows = []
-    for task in TASKS:
-        row = [task.name, task.unit]
-        means = {
-            n: float(interquartile_mean(found[task.name, n]))
-            for n in names
-            if (task.name, n) in found
-        }
-        for name in names:
-            if name not in means:
-                row.append("-")
-                continue
-            low, high = interval(found[task.name, name], interquartile_mean)
-            text = f"{means[name]:.3g} ({low:.3g} to {high:.3g})"
-            row.append(f"**{text}**" if means[name] == max(means.values()) else text)
-        rows.append(row)
-    return TextTable(["task", "unit", *names], rows, (0, 1))
-
-
-def overall_table(records: Sequence[Record]) -> TextTable:
-    """Shares of the best over all tasks, agreement with the second engine, and time, by entry."""
-    of_entries, rows = shares(records), []
-    for name in entry_names(records):
-        own = [one for one in records if one["entry"] == name]
-        mean, low, high = overall(of_entries[name])
-        kept = [
-            one["second"] / one["score"] for one in own if one.get("second") and one["score"] > 0
-        ]
-        rows.append(
-            [
-                name,
-                own[0]["about"],
-                f"{len(of_entries[name])}",
-                f"{mean:.2f} ({low:.2f} to {high:.2f})",
-                f"{np.median(kept):.0%}" if kept else "-",
-                fixed(float(np.median([one["wall_s"] for one in own])), 1),
-            ]
-        )
-    headings = ["entry", "method", "tasks", "share of the best", "second engine", "time, s"]
-    return TextTable(headings, rows, (0, 1))
-
-
-def best_table(records: Sequence[Record]) -> TextTable:
-    """The best solution of each task on both engines."""
-    rows = []
-    for task in TASKS:
-        own = [one for one in records if one["task"] == task.name]
-        if not own:
-            continue
-        best = max(own, key=lambda one: one["score"])
-        engine = "MuJoCo" if task.second is MUJOCO else "diagram"
-        numbers = [f"{best[key]:.3g}" for key in ("score", "second")]
-        rows.append([task.name, best["entry"], f"{best['seed']}", *numbers, engine])
-    headings = ["task", "entry", "seed", "compiled", "second", "second engine"]
-    return TextTable(headings, rows, (0, 1, 5))
-
-
 def scores_figure(records: Sequence[Record]) -> Figure:
     """Scores of all seeds by task and entry, as shares of the best interquartile mean."""
     names, of_entries = entry_names(records), shares(records)
@@ -415,19 +312,40 @@ def scores_figure(records: Sequence[Record]) -> Figure:
     return figure
 
 
+def numbers(records: Sequence[Record]) -> dict[str, Any]:
+    """Numbers of the page: of each entry over all tasks, and interquartile means with their
+    intervals and the best solution by task."""
+    found, of_entries = scores(records), shares(records)
+    entries: dict[str, Any] = {}
+    for name in entry_names(records):
+        own = [one for one in records if one["entry"] == name]
+        kept = [
+            one["second"] / one["score"] for one in own if one.get("second") and one["score"] > 0
+        ]
+        entries[name] = {
+            "about": own[0]["about"],
+            "tasks": len(of_entries[name]),
+            "share": overall(of_entries[name]),
+            "kept": np.median(kept) if kept else math.nan,
+            "time": np.median([one["wall_s"] for one in own]),
+        }
+    means: dict[str, dict[str, tuple[float, ...]]] = {}
+    for (task, name), each in found.items():
+        mean = float(interquartile_mean(each))
+        means.setdefault(task, {})[name] = (mean, *interval(each, interquartile_mean))
+    highest = {task: max(of_task, key=of_task.__getitem__) for task, of_task in means.items()}
+    best = {
+        task.name: max(own, key=lambda one: one["score"])
+        for task in TASKS
+        if (own := [one for one in records if one["task"] == task.name])
+    }
+    return {"entries": entries, "means": means, "highest": highest, "best": best}
+
+
 def page(records: Sequence[Record]) -> str:
     """Text of the page, from the records."""
-    about = "\n".join(f"- `{t.name}`: {t.about}; score in {t.unit}" for t in TASKS)
-    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(TEMPLATE.read_text("utf-8")).render(
-        about=about,
-        overall=overall_table(records).markdown(),
-        tasks=task_table(records).markdown(),
-        best=best_table(records).markdown(),
-        episodes=EPISODES,
-        seeds=SEEDS,
-        least=LEAST_SPEED,
-    )
+    settings = {"tasks": TASKS, "episodes": EPISODES, "seeds": SEEDS, "least": LEAST_SPEED}
+    return rendered("bench.md", **settings, **numbers(records))
 
 
 def main() -> None:

@@ -2,7 +2,7 @@
 
     python runs/benchmark.py [TABLE ...]
 
-Prints tables in Markdown for tetra_drake/engines/README.md. The gaits are random gaits with seeds
+Prints tables in Markdown for tetra_drake/engines/speed.md. The gaits are random gaits with seeds
 0, 1 ... on the scenario `thesis`. Without names, the tables `engines`, `batches`, `grounds` and
 `controlled` are printed:
 
@@ -142,26 +142,26 @@ def engines_table(scenario: Scenario, engines: Sequence[str]) -> str:
     return TextTable([*headings, "evaluations per gait"], rows).markdown()
 
 
-class Batch(NamedTuple):
-    """A batch of random gaits, with seeds 0, 1 ..., that are simulated at the same time."""
+def median_times(*runs: Callable[[], object]) -> np.ndarray:
+    """Median wall time (s) of each function (functions,). They take turns in several rounds, so
+    that other load on the machine affects all of them equally; a first round compiles."""
+    rounds = []
+    for _ in range(1 + ROUNDS):
+        times = []
+        for run in runs:
+            started = time.perf_counter()
+            run()
+            times.append(time.perf_counter() - started)
+        rounds.append(times)
+    return np.median(rounds[1:], axis=0)
 
-    scenario: Scenario
-    gaits: int
-    cores: int = 1
 
-    def speed(self) -> float:
-        """Speed of all gaits together, as a multiple of real time."""
-        started = time.perf_counter()
-        results = walk(self.scenario, self.gaits, cores=self.cores, lanes=True)
-        return sum(result.duration for result in results) / (time.perf_counter() - started)
-
-
-def median_speeds(batches: Sequence[Batch]) -> np.ndarray:
-    """Median speed of each batch (batches,). Batches take turns in several rounds, so that other
-    load on the machine affects all of them equally."""
-    for batch in batches:
-        batch._replace(scenario=brief(batch.scenario)).speed()
-    return np.median([[batch.speed() for batch in batches] for _ in range(ROUNDS)], axis=0)
+def speeds(*batches: tuple[Scenario, int], cores: int = 1) -> np.ndarray:
+    """Speeds (batches,) of random gaits that are simulated together, as multiples of real time. A
+    batch is a scenario and a number of gaits."""
+    walks = [partial(walk, each, gaits, cores=cores, lanes=True) for each, gaits in batches]
+    simulated = [gaits * each.simulation.duration for each, gaits in batches]
+    return np.array(simulated) / median_times(*walks)
 
 
 def batches_table(scenario: Scenario) -> str:
@@ -169,10 +169,9 @@ def batches_table(scenario: Scenario) -> str:
     compiled = scenario.with_changes({"engine": "!Compiled {}"})
     rows = []
     for cores in sorted({1, available_cores()}):
-        batches = [Batch(compiled, gaits, cores) for gaits in BATCHES if gaits >= cores]
-        speeds = [f"{speed:,.0f}" for speed in median_speeds(batches)]
+        batches = [(compiled, gaits) for gaits in BATCHES if gaits >= cores]
         too_few = [""] * (len(BATCHES) - len(batches))
-        rows.append([str(cores), *too_few, *speeds])
+        rows.append([str(cores), *too_few, *(f"{x:,.0f}" for x in speeds(*batches, cores=cores))])
     return TextTable(["cores/gaits", *map(str, BATCHES)], rows).markdown()
 
 
@@ -183,20 +182,18 @@ def grounds_table(scenario: Scenario) -> str:
         "the scenario's": {},
         "live network": {"cpg.signals": "live"},
         "feedback": {"cpg.signals": "live", "cpg.feedback": senses},
-        "rough": {"terrain": rough.terrain, "robot.contacts": rough.robot.contacts},
+        "rough": {"terrain": rough.terrain, "robot.contacts": rough.values()["robot.contacts"]},
     }
     batches = []
     for changes in grounds.values():
-        ground = scenario.with_changes(changes)
-        compiled, diagram = (
-            ground.with_changes({"engine": "!Compiled {}"}),
-            ground.with_changes({"engine": "!Drake {}"}),
+        compiled, drake = (
+            scenario.with_changes({**changes, "engine": engine})
+            for engine in ("!Compiled {}", "!Drake {}")
         )
-        batches += [Batch(compiled, 1), Batch(compiled, GROUND_BATCH), Batch(diagram, 1)]
-    speeds = median_speeds(batches).reshape(len(grounds), 3)
+        batches += [(compiled, 1), (compiled, GROUND_BATCH), (drake, 1)]
     rows = [
         [name, f"{alone:,.0f}", f"{many:,.0f}", fixed(drake)]
-        for name, (alone, many, drake) in zip(grounds, speeds, strict=True)
+        for name, (alone, many, drake) in zip(grounds, speeds(*batches).reshape(-1, 3), strict=True)
     ]
     headings = ["ground", "compiled, one gait", f"compiled, {GROUND_BATCH} gaits", "drake"]
     return TextTable(headings, rows).markdown()
@@ -264,19 +261,6 @@ def rollout_row(scenario: Scenario) -> list[str]:
     return [f"`{scenario.name}`, MuJoCo's rollout", *(f"{speed:,.0f}" for speed in speeds)]
 
 
-def median_times(*runs: Callable[[], object]) -> np.ndarray:
-    """Median wall time (s) of each function (functions,). They take turns in several rounds."""
-    rounds = []
-    for _ in range(1 + ROUNDS):
-        times = []
-        for run in runs:
-            started = time.perf_counter()
-            run()
-            times.append(time.perf_counter() - started)
-        rounds.append(times)
-    return np.median(rounds[1:], axis=0)  # the first round compiles
-
-
 def controlled_table(scenario: Scenario) -> str:
     """Table of the speed of robots in control periods."""
     compiled, coulomb = scenario.with_changes({"engine": "!Compiled {}"}), load_scenario("coulomb")
@@ -308,50 +292,39 @@ def sizes_table(scenario: Scenario) -> str:
     table = []
     for kind, each in [(kind, one) for kind, robots in kinds.items() for one in robots]:
         one, bodies = each.with_numbers(duration), each.robot.body_count
-        cells = [kind, str(bodies)]
-        for gaits in (1, LANES):
-            compiled, steps = cpu_time(one.with_changes({"engine": "!Compiled {}"}), gaits)
-            cells.append(f"{1e6 * compiled / steps / bodies:.2f}")
-        on_diagram = ""
+        compiled, on_diagram = one.with_changes({"engine": "!Compiled {}"}), ""
+        costs = [cpu_time(compiled, gaits) for gaits in (1, LANES)]
         if bodies <= LARGEST_DIAGRAM:
-            short = one.with_numbers(SHORT)
-            diagram, _ = cpu_time(short.with_changes({"engine": "!Drake {}"}))
-            on_diagram = f"{diagram / short.simulation.duration:.3g}"
-        table.append([*cells, on_diagram])
-    headings = [
-        "robot",
-        "bodies",
-        "compiled: µs per step and body, one gait",
-        f"{LANES} gaits at a time",
-        "drake: s per simulated second",
-    ]
+            short = one.with_numbers(SHORT).with_changes({"engine": "!Drake {}"})
+            on_diagram = f"{cpu_time(short)[0] / short.simulation.duration:.3g}"
+        per_body = [f"{1e6 * seconds / steps / bodies:.2f}" for seconds, steps in costs]
+        table.append([kind, str(bodies), *per_body, on_diagram])
+    headings = ["robot", "bodies", "compiled: µs per step and body, one gait"]
+    headings += [f"{LANES} gaits at a time", "drake: s per simulated second"]
     return TextTable(headings, table).markdown()
 
 
 def mast(vertebrae: int) -> StructureFile:
     """The shipped mast with another number of vertebrae."""
-    tree = read_structure("mast").model_dump()
-    nodes = {name[3:]: place for name, place in tree["nodes"].items() if name.startswith("v1_")}
+    tree, numbers = read_structure("mast").model_dump(), range(1, vertebrae + 1)
     pitch = tree["nodes"]["v2_centre"][0] - tree["nodes"]["v1_centre"][0]
-    numbers, bar = range(1, vertebrae + 1), tree["struts"]["v1"]
-    tree["nodes"] = {
-        f"v{i}_{name}": [x + (i - 1) * pitch, y, z]
-        for i in numbers
-        for name, (x, y, z) in nodes.items()
-    }
-    tree["struts"] = {f"v{i}": bar | {"pairs": moved(bar["pairs"], {1: i})} for i in numbers}
+    first = {name[3:]: place for name, place in tree["nodes"].items() if name.startswith("v1_")}
+
+    def moved(pairs: list[list[str]], by: int) -> list[list[str]]:
+        return [[f"v{int(node[1]) + by}_{node[3:]}" for node in pair] for pair in pairs]
+
+    bar = tree["struts"]["v1"]
     for group in tree["cables"].values():
         pairs = [pair for pair in group["pairs"] if pair[0].startswith("v1_")]
-        group["pairs"] = [pair for i in numbers[:-1] for pair in moved(pairs, {1: i, 2: i + 1})]
-    driven = {name for name in tree["actuated"] if name.endswith("_1")}
+        group["pairs"] = [pair for i in numbers[:-1] for pair in moved(pairs, i - 1)]
+    driven = {name: group for name, group in tree["actuated"].items() if name.endswith("_1")}
+    places = {
+        f"v{i}_{n}": [x + (i - 1) * pitch, y, z] for i in numbers for n, (x, y, z) in first.items()
+    }
+    struts = {f"v{i}": bar | {"pairs": moved(bar["pairs"], i - 1)} for i in numbers}
     return StructureFile.model_validate(
-        tree | {"actuated": {name: tree["actuated"][name] for name in driven}}
+        tree | {"nodes": places, "struts": struts, "actuated": driven}
     )
-
-
-def moved(pairs: list[list[str]], vertebrae: dict[int, int]) -> list[list[str]]:
-    """Pairs of nodes of a mast, such as v1_top, on other vertebrae."""
-    return [[f"v{vertebrae[int(node[1])]}_{node[3:]}" for node in pair] for pair in pairs]
 
 
 def lattice(side: int) -> StructureFile:
@@ -360,31 +333,30 @@ def lattice(side: int) -> StructureFile:
     robot, tree = Robot.of(load_scenario("prism")), read_structure("prism").model_dump()
     p_WN = node_positions(robot.structure, robot.structure.initial_state)
     places = dict(zip(robot.structure.node_names, p_WN, strict=True))
-    prisms = [*itertools.product(range(side), repeat=2)]
+    prisms, links = [*itertools.product(range(side), repeat=2)], []
+    for way in ((1, 0), (0, 1)):
+        step = SPACING * np.array([*way, 0.0])
+        for level in (("n0", "n1", "n2"), ("n3", "n4", "n5")):
+            near = sorted(
+                itertools.product(level, repeat=2),
+                key=lambda ab: float(np.linalg.norm(places[ab[1]] + step - places[ab[0]])),
+            )
+            for i, j in prisms:
+                x, y = i + way[0], j + way[1]
+                if max(x, y) < side:
+                    links += [[f"{a}-{i}-{j}", f"{b}-{x}-{y}"] for a, b in near[:2]]
+    for group in (*tree["struts"].values(), *tree["cables"].values()):
+        of_one = group["pairs"]
+        group["pairs"] = [[f"{a}-{i}-{j}", f"{b}-{i}-{j}"] for i, j in prisms for a, b in of_one]
+    if links:
+        loose = {"free_length": None, "tension": 0.1, "pairs": links}
+        tree["cables"]["link"] = tree["cables"]["side"] | loose
+    tree["actuated"] = {"side_1": ["side n0-0-0 n3-0-0"], "side_2": ["side n1-0-0 n4-0-0"]}
     tree["nodes"] = {
         f"{node}-{i}-{j}": (place + SPACING * np.array([i, j, 0.0])).tolist()
         for i, j in prisms
         for node, place in places.items()
     }
-    links = []
-    for i, j in prisms:
-        for di, dj in ((1, 0), (0, 1)):
-            for level in (("n0", "n1", "n2"), ("n3", "n4", "n5")):
-                way = SPACING * np.array([di, dj, 0.0])
-                pairs = sorted(
-                    itertools.product(level, repeat=2),
-                    key=lambda ab: float(np.linalg.norm(places[ab[1]] + way - places[ab[0]])),
-                )
-                if i + di < side and j + dj < side:
-                    links += [[f"{a}-{i}-{j}", f"{b}-{i + di}-{j + dj}"] for a, b in pairs[:2]]
-    for group in (*tree["struts"].values(), *tree["cables"].values()):
-        group["pairs"] = [
-            [f"{a}-{i}-{j}", f"{b}-{i}-{j}"] for i, j in prisms for a, b in group["pairs"]
-        ]
-    if links:
-        loose = {"free_length": None, "tension": 0.1, "pairs": links}
-        tree["cables"]["link"] = tree["cables"]["side"] | loose
-    tree["actuated"] = {"side_1": ["side n0-0-0 n3-0-0"], "side_2": ["side n1-0-0 n4-0-0"]}
     return StructureFile.model_validate(tree)
 
 

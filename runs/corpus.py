@@ -7,8 +7,8 @@ one second from there on the compiled engine, the Drake diagram and MuJoCo. A st
 weight or with anchors has no ground; others stand on one. Bars of plane models cross, so struts do
 not touch each other.
 
-Writes measured.json and README.md in that folder. Without names, the structures that have no
-numbers yet are measured; so an interrupted run goes on where it stopped.
+Writes measured.json, tables and README.md in that folder. Without names, the structures that have
+no numbers yet are measured; so an interrupted run goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import TextTable
+from tetra_drake.formatting import listed, rounded
 from tetra_drake.laws.capsules import NoStrutContact
 from tetra_drake.laws.terrain import Nothing
 from tetra_drake.results.result import SimulationResult
@@ -43,9 +44,38 @@ ENGINES = {"compiled": Compiled(), "drake": Drake(), "mujoco": Mujoco()}
 SECONDS = {"simulation.duration": 1.0, "simulation.steady_from": 0.5}
 ABOUT = """# Structures of the literature
 
-Made by `python runs/corpus.py` from the files of this folder; each names its source. Rest: the
-largest displacement of a node within one second from the equilibrium. Speed: simulated time per
-wall time, one robot on the compiled engine. Masses are in kg, frequencies in Hz."""
+Tensegrities, cable nets, domes and cable robots of books, papers and public files: {count}
+structure files, each with its source, in equilibrium on three engines. Tests find the known numbers
+again. Made by `python runs/corpus.py`.
+
+| | least | median | greatest |
+| --- | ---: | ---: | ---: |
+{sizes}
+
+- [`structures.csv`](structures.csv): each structure with its source, its states of self-stress and
+  mechanisms, and the numbers above. *Speed* is the simulated time per wall time of one robot on the
+  compiled engine.
+- [`known.csv`](known.csv): {known} numbers that sources or statics give, beside ours, which differ
+  by {apart} % at most.
+
+Within one second from the equilibrium no node moves by more than {moves}.
+
+To add one: a structure file with the line `# source: ...`, what is known of it in
+[`known.yaml`](known.yaml), and `python runs/corpus.py NAME`.
+
+{names}
+"""
+SIZES = {
+    "bodies": "bodies",
+    "cables": "cables",
+    "mass": "mass (kg)",
+    "frequency": "lowest frequency (Hz)",
+    "speed": "speed (times real time)",
+}
+"""Numbers of a structure on the page, with their headings."""
+MOVES = {engine: f"moves on {engine} (m)" for engine in ENGINES}
+COLUMNS = SIZES | {"states": "self-stress states", "mechanisms": "mechanisms"} | MOVES
+"""Numbers of a structure in the table, with their headings."""
 
 
 def names() -> list[str]:
@@ -135,26 +165,40 @@ def measured(name: str) -> dict[str, Any]:
     return row
 
 
-def page(rows: dict[str, dict[str, Any]]) -> str:
-    """Content of README.md."""
-    table, numbers = [], []
+def tables(rows: dict[str, dict[str, Any]]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The structures with their sources and numbers, and what is known of them beside ours."""
+    structures, known = [], []
     for name, row in sorted(rows.items()):
         text = (FOLDER / f"{name}.yaml").read_text(encoding="utf-8")
         source = re.search(r"^# source: (.*(?:\n#   .*)*)", text, re.MULTILINE)
-        title = text.splitlines()[0].removeprefix("# ")
-        about = f"{title}; {source[1] if source else ''}".replace("\n#   ", " ")
-        counts = [str(row[key]) for key in ("bodies", "cables", "states", "mechanisms")]
-        rates = [f"{row[key]:.4g}" for key in ("mass", "frequency", "speed")]
-        moved = [row[engine] for engine in ENGINES]
-        shown = [m if isinstance(m, str) else f"{1e6 * m:.2g}" for m in moved]
-        table.append([f"[{name}]({name}.yaml)", about, *counts, *rates, *shown])
-        for what, known, ours, by in row["known"]:
-            numbers.append([name, what, f"{known:.6g}", f"{ours:.6g}", by])
-    headings = ["structure", "source", "bodies", "cables", "self-stress states", "mechanisms"]
-    headings += ["mass", "lowest frequency", "speed", *(f"rest, {e}, um" for e in ENGINES)]
-    known = TextTable(["structure", "quantity", "known", "ours", "by"], numbers)
-    parts = [ABOUT, TextTable(headings, table).markdown(), "## Known numbers", known.markdown()]
-    return "\n\n".join(parts) + "\n"
+        about = text.splitlines()[0].removeprefix("# ")
+        by = (source[1] if source else "").replace("\n#   ", " ")
+        numbers = {heading: row[key] for key, heading in COLUMNS.items()}
+        structures.append({"structure": name, "what it is": about, "source": by} | numbers)
+        known += [[name, *one] for one in row["known"]]
+    columns = ["structure", "quantity", "known", "ours", "by"]
+    return pd.DataFrame(structures), pd.DataFrame(known, columns=columns)
+
+
+def page(structures: pd.DataFrame, known: pd.DataFrame) -> str:
+    """Content of README.md."""
+    sizes = structures[[*SIZES.values()]].quantile([0.0, 0.5, 1.0])
+    rows = [f"| {name} | {' | '.join(f'{x:.4g}' for x in sizes[name])} |" for name in sizes]
+    apart = (known["ours"] / known["known"] - 1.0).abs()[known["known"] != 0.0]
+    farthest = {one: pd.to_numeric(structures[of], "coerce").max() for one, of in MOVES.items()}
+    return ABOUT.format(
+        count=len(structures),
+        sizes="\n".join(rows),
+        known=len(known),
+        apart=rounded(100.0 * apart.max(), 2),
+        moves=listed([f"{rounded(1e9 * far)} nm ({one})" for one, far in farthest.items()]),
+        names=" · ".join(f"[{name}]({name}.yaml)" for name in structures["structure"]),
+    )
+
+
+def csv(table: pd.DataFrame) -> str:
+    """A table as text, with numbers of six significant digits."""
+    return table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
 
 
 def main(chosen: list[str]) -> None:
@@ -165,7 +209,10 @@ def main(chosen: list[str]) -> None:
         rows[name] = measured(name)
         print(name, json.dumps(rows[name]))
         write_whole(MEASURED, json.dumps(rows, indent=1, sort_keys=True) + "\n")
-        write_whole(PAGE, page(rows))
+        structures, known = tables(rows)
+        write_whole(FOLDER / "structures.csv", csv(structures))
+        write_whole(FOLDER / "known.csv", csv(known))
+        write_whole(PAGE, page(structures, known))
 
 
 if __name__ == "__main__":

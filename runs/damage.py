@@ -22,13 +22,13 @@ from typing import Any
 import numpy as np
 import pandas
 from matplotlib.figure import Figure
+from page import rendered
 from records import append, read
 
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.style import OKABE_ITO, common_style, save_figure
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.lab.planner import Planner
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
@@ -340,26 +340,12 @@ def planned(rows: Sequence[Row]) -> pandas.DataFrame:
     return table.assign(share=table["speed"] / gait, own=table["speed"] / whole)
 
 
-def percent(share: float) -> str:
-    """A share as text."""
-    return f"{fixed(100.0 * share, 0)} %"
-
-
-def cable_table(shares: pandas.DataFrame, plans: pandas.DataFrame) -> TextTable:
-    """Speeds by cable, left and right ones together."""
-    rows = []
-    for name, own in shares.groupby("group", sort=False):
-        lost, found = own["lost"].median(), own["found"].median()
-        by_planner = plans[plans["group"] == name]["share"]
-        least = percent(own["found"].min())
-        plan = percent(by_planner.mean()) if len(by_planner) else "-"
-        reached = percent((own["found"] >= GOAL).mean())
-        trials = fixed(own["trials"].median(), 0)
-        of_best = percent(own["of_best"].median())
-        cells = [percent(lost), percent(found), least, reached, of_best, trials, plan]
-        rows.append([str(name), f"{len(own)}", *cells])
-    headings = ["cable", "robots", "old gait", "after trials", "least", f"{percent(GOAL)} back"]
-    return TextTable([*headings, "of the fastest", "trials", "planner"], rows)
+def by_cable(shares: pandas.DataFrame, plans: pandas.DataFrame) -> pandas.DataFrame:
+    """Numbers of each cable, left and right ones together."""
+    table = shares.assign(back=shares["found"] >= GOAL).groupby("group", sort=False)
+    medians = table[["lost", "found", "of_best", "trials"]].median()
+    counts = {"robots": table.size(), "least": table["found"].min(), "back": table["back"].mean()}
+    return medians.assign(**counts, planner=plans.groupby("group")["share"].mean())
 
 
 _PLANNER: Any = {"color": "black", "marker": "x", "linestyle": "", "markersize": 4.0}
@@ -401,98 +387,27 @@ def speed_figure(shares: pandas.DataFrame, plans: pandas.DataFrame) -> Figure:
 def page(walks: Sequence[Row], plan_rows: Sequence[Row], candidates: Sequence[Row]) -> str:
     """Text of the page."""
     shares, by_plan = outcomes(walks), planned(plan_rows)
-    fastest = max(row["speed"] for row in candidates)
-    return PAGE.format(
+    is_whole = by_plan["cable"] == ""
+    return rendered(
+        "damage.md",
         robots=len(shares),
         walks=len(walks),
         gaits=len(candidates),
         known=len(candidates) // len(STRENGTHS),
-        speed=fixed(candidates[0]["speed"], 3),
-        fastest_speed=fixed(fastest, 3),
-        fastest=percent(fastest / candidates[0]["speed"]),
-        of_best=percent(shares["of_best"].median()),
-        lost=percent(shares["lost"].median()),
-        found=percent(shares["found"].median()),
-        reached=percent((shares["found"] >= GOAL).mean()),
-        plans=sum(bool(row["cable"]) for row in plan_rows),
-        plan_whole=fixed(by_plan[by_plan["cable"] == ""]["speed"].iloc[0], 3),
-        plan_share=percent(by_plan[by_plan["cable"] != ""]["share"].median()),
-        cpu=fixed(by_plan["cpu_s"].median(), 2),
-        table=cable_table(shares, by_plan).markdown(),
+        speed=candidates[0]["speed"],
+        fastest=max(row["speed"] for row in candidates),
+        medians=shares[["of_best", "lost", "found"]].median(),
+        reached=(shares["found"] >= GOAL).mean(),
+        plans=by_plan[~is_whole],
+        whole=by_plan[is_whole].iloc[0],
+        cpu=by_plan["cpu_s"].median(),
+        cables=by_cable(shares, by_plan),
         seeds=shares["seed"].nunique(),
         turns=len(TURNS),
-        steady=fixed(scenario().simulation.settling_time, 1),
+        steady=scenario().simulation.settling_time,
         reach=REACH,
+        goal=GOAL,
     )
-
-
-PAGE = """\
-# Damage
-
-The [robot with motors](../motors/README.md) loses one of its 24 cables, and looks for a way to walk
-without it. `python runs/damage.py` makes this page.
-
-**With a cable less, the old gait has {lost} of its speed (median). The best of at most ten trials
-has {found}, and in {reached} of the cases 80 % or more, because the robot may pull harder than
-before: the goal, a median of 80 %, is reached. Without the damage the map's fastest gait would have
-{fastest}; of that speed the trials leave {of_best}. A planner that knows which cable is cut, and
-does not pull harder, has {plan_share}, without a trial.**
-
-![speed by cable, and by number of trials](speed.svg)
-
-Left: median and range for each cable. Right: median and quartiles of all cases by number of trials.
-
-{table}
-
-- *Robots*: {seeds} robots, whose constants and starts differ by up to ±5 %, lose each of the 24
-  cables, at the start of the walk: {robots} cases, {walks} walks of 15 s. Left and right cables
-  share a row. The motors pull at outer bottom cables.
-- *Speed*: of the centre along x, from {steady} s on. Undisturbed and whole, the robot has {speed}
-  body lengths/s. Shares are of the same robot's speed before the damage, but for *of the fastest*.
-- *Old gait*: it goes on. *After trials*: the fastest of old gait and trials; *least*: worst case;
-  *80 % back*: share of the cases. *Trials*: median number.
-- *Of the fastest*: speed after trials, as a share of the whole robot's with the fastest gait of the
-  map, {fastest_speed} body lengths/s undisturbed. This is the old gait at a strength of 1.5.
-- *Planner*: share for the undisturbed robot, mean of both sides; see below.
-
-## Trial and error
-
-As Cully et al. (*Robots that can adapt like animals*, Nature 521, 2015). The map has the fastest
-gait for each combination of the five bodies' shares of time in the air, in quarters, among the
-12,000 gaits of [`motors-map`](../motors-map/README.md). With the old gait and {turns} turns of each
-there are {known} gaits. A turn makes the motors of one side stronger. Each gait can also be tried
-at a strength of 1.5, with tensions of the motors 1.5 times the usual ones: {gaits} trials. With the
-old gait the greatest tension of a cable is then 7.3 N, the usual one 6.6 N, and a motor gives up to
-21.5 N. The cost of transport is 5.2 in place of 5.4.
-
-A Gaussian process on the shares of time in the air and the change of heading, all of the whole
-robot, tells what the damage takes from each gait. The next trial is the gait with the most speed
-expected, uncertainty included. Trials end when the fastest one has 90 % of what is expected of
-another gait, or after ten. The settings are the published ones but for the reach of a trial on the
-map, {reach}.
-
-## Planner
-
-`tetra_drake.Planner` on an exact model without the cable: {plans} of 24 cables, walks of 8 s from
-rest, whose first 2 s do not count. It wants speed along x; its tensions are within the usual
-amplitude of the network. The whole robot walks {plan_whole} body lengths/s by it. A
-decision costs {cpu} s of one core, and four are needed each second: not real time.
-
-## What disappointed
-
-- Pulling harder does most of it: the same trials at the usual strength alone have 51 %, and reach
-  80 % in 13 % of the cases.
-- Without an outer bottom cable in the middle, the robot hardly walks with any gait that it tries:
-  the strong gaits come first, and none of ten helps. At the usual strength alone, the trials
-  without the cable of T3-T4 find one with 23 %. The robot itself is able to walk: the planner does.
-- Gaits whose left and right motors do different things were searched, as well: about 2,000
-  mutations with an oscillator for each motor, at a strength of 1.5, the fastest one kept in each
-  cell (MAP-Elites). The map had more cells, but ten trials on the undisturbed robot then had 89 %.
-  This search was not recorded.
-- Disturbances of ±5 % hardly count beside the damage: the five robots do alike.
-- The planner walks fast but not straight: its cost does not ask for it. With 6 s that count, single
-  shares are uncertain: some robots seem faster damaged than whole.
-"""
 
 
 def main() -> None:

@@ -1,11 +1,14 @@
 """Makes the recorded runs in the folder of this file from nothing.
 
-    python runs/record.py [NAME ...]
+    python runs/record.py [--so-far] [NAME ...]
 
 Each experiment is evolved and analysed in a folder of out/runs, then thinned into a folder here. A
 page and a picture (made by Chromium) show its best gait. Experiments in README.md are filmed, too.
 After an interruption the script continues; finished experiments are skipped. All pages share the
 viewer meshcat.js of one version of Drake. times.json has the time of each experiment.
+
+With --so-far, the folders here get what there is of experiments that are being evolved. Such a run
+is whole, not thinned: where out/runs has none, the script goes on from it.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,7 +32,7 @@ from thinning import thin
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.manifest import MANIFEST, read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import load_run
 from tetra_drake.experiment import evolve
@@ -50,6 +54,7 @@ VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
 TIMES, EXPORTED = "times.json", "lab"
+SO_FAR = "--so-far"
 RATE = 50.0
 """Sampling rate (Hz) of exported commands."""
 
@@ -231,35 +236,62 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
 
     Raises InputError if `scratch` holds a run of another scenario.
     """
-    made, shown = scratch / name, out / name
+    made, shown, scenario = scratch / name, out / name, experiment.scenario(name)
     analysis, copy = made / ANALYSIS, shown / ANALYSIS
     if analysis.exists() and copy.exists() and filecmp.cmp(analysis, copy, shallow=False):
         return
+    if not (made / MANIFEST).exists() and is_unfinished(shown, scenario):
+        thin(shown, made, whole=True)
     resume, progress = (made / MANIFEST).exists(), Progress(sys.stdout)
     if not resume:
         save_times(load_times(out) | {name: {}}, out)
     with timed(name, "evolution", out):
-        scenario = experiment.scenario(name)
         # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
         evolve(scenario, made, resume=resume, reevaluate=False, report=False, progress=progress)
+    publish(name, experiment, made, out=out)
+
+
+def record_so_far(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> None:
+    """Puts what there is of a run in `scratch`, which another process may evolve, into `out`."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / name
+        thin(scratch / name, copy, whole=True)
+        publish(name, experiment, copy, out=out, whole=True)
+
+
+def is_unfinished(shown: Path, scenario: Scenario) -> bool:
+    """True if a folder holds a whole run of this scenario, which can go on."""
+    if not (shown / MANIFEST).exists():
+        return False
+    manifest = read_manifest(shown)
+    return not manifest.thinned and not manifest.scenario.differences(scenario)
+
+
+def publish(
+    name: str, experiment: Experiment, made: Path, *, out: Path, whole: bool = False
+) -> None:
+    """Analyses the run in the folder `made`, unless that is done, and shows it in `out`: thinned,
+    unless it is to be `whole`."""
+    analysis, shown = made / ANALYSIS, out / name
     if not analysis.exists():
         with timed(name, "analysis", out):
             judge_elites(made)
             analyse(made, workers=available_cores())
     with timed(name, "pages", out):
-        make_folder(made, shown)
+        make_folder(made, shown, whole=whole)
         show(shown, viewer=out / VIEWER, film=experiment.film)
         if experiment.exported:
             run = load_run(made)
             export(run.scenario, run.best_gait(), rate=RATE, out=shown / EXPORTED)
-    shutil.copy(analysis, copy)
+    shutil.copy(analysis, shown / ANALYSIS)
 
 
-def make_folder(made: Path, shown: Path) -> None:
-    """Thins a run into the folder `shown`, in place of its old trials and exported files."""
+def make_folder(made: Path, shown: Path, *, whole: bool = False) -> None:
+    """Thins a run into the folder `shown`, in place of its old trials and exported files; or copies
+    its record, if it is to be `whole`."""
     for old in (*shown.glob("trial_*"), *shown.glob(EXPORTED)):
         shutil.rmtree(old)
-    thin(made, shown)
+    thin(made, shown, whole=whole)
 
 
 def load_times(out: Path) -> dict[str, Any]:
@@ -317,10 +349,11 @@ def chosen(names: Sequence[str]) -> Sequence[str]:
     return names or [*EXPERIMENTS]
 
 
-def main(names: Sequence[str]) -> None:
+def main(arguments: Sequence[str]) -> None:
     """Records the experiments of the given names, or all. Raises InputError."""
-    for name in chosen(names):
-        record(name, EXPERIMENTS[name], scratch=SCRATCH, out=HERE)
+    make = record_so_far if SO_FAR in arguments else record
+    for name in chosen([argument for argument in arguments if argument != SO_FAR]):
+        make(name, EXPERIMENTS[name], scratch=SCRATCH, out=HERE)
 
 
 if __name__ == "__main__":

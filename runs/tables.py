@@ -20,18 +20,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import jinja2
 import numpy as np
 import pandas
 from analyse import DRAWN, MUJOCO, SHOWN, SPEED, TIGHT, TURNED, Analysis, load_analysis
+from page import rendered
+from parting import partings
 from PIL import Image
 from readings import RECORD, load_record
 from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import TextTable, fixed, listed, rounded, uncertain
+from tetra_drake.formatting import TextTable, fixed, rounded, uncertain
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import SCENARIO, load_scenario
@@ -193,19 +195,8 @@ def gallery_table(runs: Runs) -> str:
         name: sum(stage["cores_s"] for stage in stages.values()) / (2 * 60)
         for name, stages in load_times(HERE).items()
     }
-    rows = []
-    for name, best in best_of_all(runs).items():
-        picture = shown(name, PICTURE, f"{name} walking")
-        diagram = shown(name, best.diagram, f"how {name} moves")
-        title = f"[`{name}`]({name}/{README}): {best.title}"
-        title += f"<br>{picture} {diagram} [replay]({name}/{REPLAY})"
-        reached = [best.first, *(best.text(engine) for engine in ENGINES[1:])]
-        keeps = "-" if math.isnan(best.kept) else f"{100.0 * best.kept:.0f} %"
-        rows.append([title, *reached, best.speed, keeps, fixed(minutes.get(name, math.nan), 0)])
-    rows.append(["all", *["" for _ in ENGINES], "", "", fixed(sum(minutes.values()), 0)])
-    return TextTable(
-        ["experiment", *ENGINES, "body lengths/s", "keeps", "minutes"], rows
-    ).markdown()
+    files = {"README": README, "REPLAY": REPLAY, "PICTURE": PICTURE, "shown": shown}
+    return rendered("gallery.md", bests=best_of_all(runs), minutes=minutes, **files)
 
 
 def differences(runs: Runs) -> pandas.DataFrame:
@@ -236,83 +227,64 @@ def differences(runs: Runs) -> pandas.DataFrame:
 
 def trust_table(runs: Runs) -> str:
     """Table of the differences between engines and their causes, by law of friction."""
-    rows, found = [], differences(runs)
-    for law, is_coulomb in (("Coulomb", True), ("the thesis's", False)):
-        under_law = found[found["coulomb"] == is_coulomb]
-        inches = under_law[["diagram", "nanometre"]].agg(["median", "max"])
-        percent = [f"{100.0 * x:.0f} %" for x in under_law["mujoco"].agg(["median", "max"])]
-        numbers = [fixed(x, 4) for x in inches.to_numpy().T.ravel()]
-        rows.append([law, f"{under_law['run'].nunique()}", f"{len(under_law)}", *numbers, *percent])
-    headings = ["friction", "runs", "gaits", "diagram, median (in)", "largest"]
-    headings += ["1 nm, median (in)", "largest", "MuJoCo, median", "largest"]
-    return TextTable(headings, rows).markdown()
+    found = differences(runs).groupby("coulomb")
+    median, most = (found[["diagram", "nanometre", "mujoco"]].agg(of) for of in ("median", "max"))
+    counts = found["run"].nunique(), found.size()
+    return rendered("trust.md", median=median, most=most, runs=counts[0], gaits=counts[1])
 
 
 def results_table(runs: Runs) -> str:
     """Table of the thesis's results and ours, for README.md."""
-    names = {"thesis": "thesis", "thesis-listing": "listing"}
-    readings, columns = load_record(RECORD), []
-    for name, reading in names.items():
-        best, trials = best_gait(name, runs[name]), pandas.DataFrame(readings[reading])
-        columns.append(
-            [
-                fixed(trials["initial_farthest_in"].max()),
-                f"{100.0 * trials['backward'].mean():.0f} %",
-                best.text("compiled").removesuffix(" in"),
-                best.text("diagram").removesuffix(" in"),
-                fixed(trials["best_in"].mean()),
-            ]
-        )
-    labels = {
-        "best gait of ten initial populations": "6.6",
-        "initial gaits that walk backward": "nearly half",
-        "best evolved gait": "14.34",
-        "the same on the Drake diagram": "",
-        "best evolved gait, mean of ten trials": "",
-    }
-    rows = [[*row, *cells] for row, *cells in zip(labels.items(), *columns, strict=True)]
-    headings = [f"[`{name}`]({HERE.name}/{name}/{README})" for name in names]
-    return TextTable(["distance in 15 s, inches", "thesis", *headings], rows).markdown()
+    names, record = {"thesis": "thesis", "thesis-listing": "listing"}, load_record(RECORD)
+    best = [best_gait(name, runs[name]) for name in names]
+    trials = [pandas.DataFrame(record[reading]) for reading in names.values()]
+    return rendered("results.md", names=[*names], best=best, trials=trials)
 
 
 def gallery_page(runs: Runs) -> str:
     """The page index.html."""
-    source = read_text(HERE / f"{GALLERY}.jinja", "template")
-    template = jinja2.Template(source, autoescape=True, keep_trailing_newline=True)
-    bests = best_of_all(runs)
     figures = {"measured": MEASURED, "planned": PLANNED}
-    return template.render(bests=bests, replay=REPLAY, picture=PICTURE, **figures)
+    return rendered(GALLERY, bests=best_of_all(runs), replay=REPLAY, picture=PICTURE, **figures)
 
 
 def trials_table(name: str, runs: Runs) -> str:
     """Table of the fittest gait of each trial of a run, on all engines and on disturbed robots.
     Below it, the trials with different distances on the engines."""
     run, units = runs[name], scenario_of(name).units
-    of_metrics = {name: units.of(UNITS[name]) for name in SHOWN}
-    rows, apart = [], []
+    metrics, rows = {name: units.of(UNITS[name]) for name in SHOWN}, []
     for trial, gait in run.best_gaits.iterrows():
-        compiled, diagram, mujoco = distances_of(run, trial)
-        if not abs(compiled - diagram) <= APART:
-            apart.append(trial)
-        judged = run.disturbed.loc[trial]
-        distances = np.array([compiled, diagram, mujoco, judged["mean"]]) / units.length
-        share, low, high = 100.0 * judged[["kept", "kept_low", "kept_high"]]
-        kept = f"{share:.0f} ({low:.0f}–{high:.0f})"
-        metrics = [gait[name] / size for name, (size, _) in of_metrics.items()]
-        counts = [f"{trial}", f"{gait['evaluations']:.0f}", fixed(gait["fitness"])]
-        rows.append([*counts, *map(fixed, distances), kept, *map(fixed, metrics)])
-    headings = ["trial", "gaits", "fitness"]
-    headings += [f"{where} ({units.length_name})" for where in (*ENGINES, "disturbed")]
-    headings.append("keeps (%)")
-    for name, (_, unit) in of_metrics.items():
-        title = name.replace("_", " ")
-        headings.append(f"{title} ({unit})" if unit else title)
-    table = TextTable(headings, rows).markdown()
-    if not apart:
-        return table
-    trials = "trial" if len(apart) == 1 else "trials"
+        judged, (compiled, diagram, mujoco) = run.disturbed.loc[trial], distances_of(run, trial)
+        row = {
+            "trial": trial,
+            "gait": gait,
+            "distances": np.array([compiled, diagram, mujoco, judged["mean"]]) / units.length,
+            "kept": 100.0 * judged[["kept", "kept_low", "kept_high"]].to_numpy(),
+            "metrics": [gait[name] / size for name, (size, _) in metrics.items()],
+            "is_apart": not abs(compiled - diagram) <= APART,
+        }
+        rows.append(row)
+    by_name = {name.replace("_", " "): unit for name, (_, unit) in metrics.items()}
     apart_by = f"{rounded(APART / units.length, 1)} {units.length_word}"
-    return f"{table}\n\nThe engines differ by more than {apart_by} in {trials} {listed(apart)}."
+    return rendered("trials.md", rows=rows, units=units, metrics=by_name, apart_by=apart_by)
+
+
+def partings_table(name: str, other: str) -> str:
+    """Table of where the trials of a run part from the same trials of another run."""
+    found = partings(load_run(HERE / name), load_run(HERE / other))
+    columns = ["apart", "farthest", "first_best", "second_best"]
+    counts = found[["evaluations", "alike"]].astype(str)
+    rows = [
+        [f"{trial}", *counts.loc[trial], *map(fixed, numbers)]
+        for trial, numbers in found[columns].iterrows()
+    ]
+    headings = [
+        "trial",
+        "gaits",
+        "the same gaits",
+        "their distances, apart by (in)",
+        "at most (in)",
+    ]
+    return TextTable([*headings, f"`{name}` (in)", f"`{other}` (in)"], rows).markdown()
 
 
 def pages(runs: Runs) -> list[Path]:
@@ -329,6 +301,7 @@ def made_again(page: Path, runs: Runs) -> str:
             "gallery": lambda: gallery_table(runs),
             "trust": lambda: trust_table(runs),
             "trials": lambda: trials_table(page.parent.name, runs),
+            "partings": lambda: partings_table(page.parent.name, "thesis"),
         }
         return tables[name]()
 
@@ -344,7 +317,7 @@ def filled(text: str, make_table: Callable[[str], str]) -> str:
     def remade(match: re.Match[str]) -> str:
         if match[0].count("<!-- table ") > 1:
             raise ValueError(f"table {match['name']} has no end before the next one")
-        return f"{match['begin']}\n\n{make_table(match['name'])}\n\n<!-- end -->"
+        return f"{match['begin']}\n\n{make_table(match['name']).rstrip()}\n\n<!-- end -->"
 
     text, tables = _TABLE.subn(remade, text)
     if tables < text.count("<!-- table "):

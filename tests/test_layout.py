@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -84,6 +85,15 @@ def test_a_simulation_loads_nothing_of_the_lab() -> None:
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
     assert "tetra_drake.engines.simulate" in done.stdout.split()
     assert not [name for name in done.stdout.split() if name.startswith("tetra_drake.lab")]
+
+
+def test_the_drawing_of_the_house_has_all_folders_in_their_order() -> None:
+    drawing = (PACKAGE / "house.svg").read_text(encoding="utf-8")
+    drawn = " ".join(re.findall(r'class="name">([^<]+)<', drawing)).split()
+    folders = {f"{file.parent.name}/" for file in PACKAGE.glob("*/__init__.py")}
+    assert folders <= {*drawn}
+    core = [ORDER.index(name.removesuffix(".py").rstrip("/")) for name in drawn if name != "lab/"]
+    assert core == sorted(core)
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:

@@ -78,7 +78,8 @@ def test_links_and_pictures_survive_on_an_index_of_packages(readme):
     assert all(target.startswith("https://") for target in targets(text))
     assert f'<img src="{address}/raw/v1.2.3/runs/champion/walking.gif" width="380" alt="' in text
     assert (
-        f"]({address}/blob/v1.2.3/tetra_drake/scenario/README.md#a-structure-of-your-own)" in text
+        f"]({address}/blob/v1.2.3/tetra_drake/scenario/structures.md#a-structure-of-your-own)"
+        in text
     )
     assert len(targets(text)) == len(targets(read("README.md")))
 

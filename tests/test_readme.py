@@ -1,4 +1,4 @@
-"""The README and the page about scenarios: their snippets run, their links lead somewhere."""
+"""The pages: their snippets run, their commands can be parsed, their links lead somewhere."""
 
 from __future__ import annotations
 
@@ -24,7 +24,15 @@ from tetra_drake.systems import MatsuokaCpg
 
 CHECKOUT = Path(__file__).parents[1]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
-SCENARIOS = (CHECKOUT / "tetra_drake/scenario/README.md").read_text(encoding="utf-8")
+FOLDERS = "diagrams", "tetra_drake", "tests/data", ".github"
+MANUAL = [page for folder in FOLDERS for page in sorted((CHECKOUT / folder).rglob("*.md"))]
+"""Pages beside the README; those of `runs` are made by scripts."""
+
+
+def text_of(page: str) -> str:
+    """A page of the package, by its place there, without .md."""
+    return (CHECKOUT / "tetra_drake" / f"{page}.md").read_text(encoding="utf-8")
+
 
 QUICK = """\
 base: thesis
@@ -53,26 +61,25 @@ def commands(page: str) -> list[list[str]]:
 
 
 def test_the_commands_of_all_pages_are_commands_with_their_options() -> None:
-    pages = [CHECKOUT / "README.md", *CHECKOUT.glob("[dt]*/**/README.md")]
+    pages = [CHECKOUT / "README.md", *MANUAL]
     written = [arguments for page in pages for arguments in commands(page.read_text("utf-8"))]
-    assert len(written) >= 7
+    assert len(written) >= 15
     for arguments in written:
         make_parser().parse_args(arguments)  # ends the process if it cannot be parsed
 
 
 def test_the_plugin_of_the_page_is_the_example() -> None:
     folder = CHECKOUT / "tests/data/plugin"
-    (*_, law) = snippets("python", SCENARIOS)
+    (law,) = snippets("python", text_of("scenario/plugins"))
     assert law in (folder / "tetra_example/__init__.py").read_text(encoding="utf-8")
-    (entries,) = snippets("toml", SCENARIOS)
+    (entries,) = snippets("toml", text_of("scenario/plugins"))
     declared = (folder / "pyproject.toml").read_text(encoding="utf-8").splitlines()
     assert {*entries.splitlines()} <= {*declared}
 
 
 def test_the_files_of_other_kinds_are_read(work: Path) -> None:
-    texts = snippets("yaml", SCENARIOS)
-    [tower] = snippets("yaml", (CHECKOUT / "tetra_drake/lab/README.md").read_text("utf-8"))
-    [fit] = [text for text in texts if "measurements:" in text]
+    [tower] = snippets("yaml", text_of("lab/files"))
+    [_, fit] = snippets("yaml", text_of("scenario/tolerances"))
     (work / "tower.yaml").write_text(tower)
     (work / "fit.yaml").write_text(fit)
     structure = converted(Path("tower.yaml"), unit="dm")
@@ -145,18 +152,17 @@ def test_libraries_find_gaits(library: str, number: int, monkeypatch: pytest.Mon
         run_in_python(monkeypatch)
     short = td.load_scenario("coulomb").with_changes({"simulation.duration": "2.5 s"})
     monkeypatch.setattr(td, "load_scenario", lambda name: short, raising=False)
-    page = (CHECKOUT / "tetra_drake/evolution/README.md").read_text(encoding="utf-8")
-    texts, names = snippets("python", page), dict[str, Any]()
-    exec(compile(texts[0] + texts[number], "evolution/README.md", "exec"), names)
+    texts, names = snippets("python", text_of("evolution/libraries")), dict[str, Any]()
+    exec(compile(texts[0] + texts[number], "libraries.md", "exec"), names)
     gait, first = names["best"], td.seeded_gait(names["scenario"], 1)
     best, other = td.simulate_many(names["scenario"], [gait, first])
     assert best.fitness > other.fitness
 
 
 def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: None) -> None:
-    (_, snippet, _) = snippets("python", SCENARIOS)
+    (snippet, _) = snippets("python", text_of("scenario/signals"))
     names: dict[str, Any] = {}
-    exec(compile(snippet, "scenario/README.md", "exec"), names)
+    exec(compile(snippet, "signals.md", "exec"), names)
     assert names["result"].duration == names["simulator"].get_context().get_time() == 1.0
     steering = names["diagram"].GetSubsystemByName("steering")
     context = steering.GetMyContextFromRoot(names["simulator"].get_context())
@@ -170,9 +176,9 @@ def test_winches_wind_a_structure_to_its_rest(work: Path, monkeypatch: pytest.Mo
     floats = {"robot.gravity": "0 m/s^2", "terrain": "!Nothing"}
     floating = td.load_scenario("six_bar").with_changes(floats)
     monkeypatch.setattr(td, "load_scenario", lambda name: floating, raising=False)
-    (snippet, _, _) = snippets("python", SCENARIOS)
+    (_, snippet) = snippets("python", text_of("scenario/signals"))
     names: dict[str, Any] = {}
-    exec(compile(snippet, "scenario/README.md", "exec"), names)
+    exec(compile(snippet, "signals.md", "exec"), names)
     robot, trajectory = names["robot"], names["result"].trajectory
     laws = [dict(law) for law in robot.structure.cable_laws]
     for cable in robot.driven:
@@ -186,16 +192,20 @@ def test_winches_wind_a_structure_to_its_rest(work: Path, monkeypatch: pytest.Mo
 
 
 def test_the_scenarios_and_the_gait_of_the_pages_load(work: Path) -> None:
-    for file in snippets("yaml") + snippets("yaml", SCENARIOS):
-        if "base:" in file:
-            (name,) = re.findall(r"^name: (.*)$", file, re.M)
-            (work / f"{name}.yaml").write_text(file)
-            assert td.load_scenario(f"{name}.yaml").name == name
-        elif "struts:" in file:
-            (work / "structure.yaml").write_text(file)
-            assert read_structure("structure.yaml").body_count == 3
+    loaded = 0
+    for page in MANUAL:
+        for file in snippets("yaml", page.read_text(encoding="utf-8")):
+            if "base:" in file:
+                (name,) = re.findall(r"^name: (.*)$", file, re.M)
+                (work / f"{name}.yaml").write_text(re.sub(r"file: crane.yaml", "file: prism", file))
+                assert td.load_scenario(f"{name}.yaml").name == name
+                loaded += 1
+            elif "struts:" in file and page.stem == "structures":
+                (work / "structure.yaml").write_text(file)
+                assert read_structure("structure.yaml").body_count == 3
+    assert loaded >= 10
     assert td.load_scenario("snake.yaml").oscillators == 12  # three groups at four junctions
-    (gait,) = snippets("json", SCENARIOS)
+    (gait,) = snippets("json", text_of("scenario/signals"))
     (work / "gait.json").write_text(gait)
     small = td.load_scenario("feedback").with_changes({"robot.tetrahedra": 3})
     assert td.load_gait("gait.json", small).parameters == {
@@ -204,15 +214,32 @@ def test_the_scenarios_and_the_gait_of_the_pages_load(work: Path) -> None:
     }
 
 
-FOLDERS = (
-    "diagrams",
+def test_the_roads_name_what_the_files_have() -> None:
+    page = " ".join(text_of("README").split())
+    named = re.findall(r"\]\(([\w/]+\.py)\):((?:,? `\w+`)+)", page)
+    assert len(named) > 30
+    for file, names in named:
+        source = (CHECKOUT / "tetra_drake" / file).read_text(encoding="utf-8")
+        for name in re.findall(r"\w+", names):
+            assert re.search(rf"\b{name}\b", source), f"{file}: {name}"
+
+
+RUNS = (
     "runs",
     *(f"runs/{name}" for name in EXPERIMENTS if (CHECKOUT / "runs" / name).is_dir()),
-    *("runs/bench", "runs/damage", "runs/measured", "runs/planning", "runs/rolling", "tetra_drake"),
-    *(f"tetra_drake/{name}" for name in ("engines", "evolution", "scenario")),
+    *("runs/bench", "runs/damage", "runs/measured", "runs/planning", "runs/rolling"),
 )
 """Runs of one's own may lie beside the recorded ones."""
-PAGES = ["README.md", "runs/thesis/THESIS.md", *(f"{folder}/README.md" for folder in FOLDERS)]
+LINK = re.compile(r'(?:\]\(|src="|href=")([^)"]+)')
+PAGES = [
+    "README.md",
+    "CHANGELOG.md",
+    "runs/thesis/THESIS.md",
+    *(f"{run}/README.md" for run in RUNS),
+]
+PAGES += [
+    str(page.relative_to(CHECKOUT)) for page in MANUAL if LINK.search(page.read_text("utf-8"))
+]
 
 
 def anchors(page: Path) -> set[str]:
@@ -224,7 +251,7 @@ def anchors(page: Path) -> set[str]:
 @pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page: str) -> None:
     file = CHECKOUT / page
-    links = re.findall(r'(?:\]\(|src="|href=")([^)"]+)', file.read_text(encoding="utf-8"))
+    links = LINK.findall(file.read_text(encoding="utf-8"))
     assert links
     for link in links:
         if link.startswith("https://"):

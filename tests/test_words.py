@@ -25,3 +25,9 @@ def test_docstrings_and_comments_use_none_of_these_phrases() -> None:
                         found += [(file.name, token.start[0], *PHRASES.findall(text))]
     assert len(found) > 1000
     assert [place for place in found if place[2:]] == []
+
+
+def test_the_page_for_who_carries_it_on_names_the_phrases():
+    words = re.search(r"\((that of[^)]*)\)", PHRASES.pattern)[1].split("|")
+    page = (ROOT / "tetra_drake/README.md").read_text(encoding="utf-8")
+    assert len(words) == 6 and all(f'"{word}"' in page for word in words)

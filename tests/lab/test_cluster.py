@@ -114,7 +114,7 @@ def test_workers_with_other_versions_are_refused(cluster, refused):
 @pytest.mark.slow
 def test_the_batch_script_of_the_page_runs_and_goes_on(tmp_path):
     """With a stand-in for SLURM's srun. Submitted once more, the script resumes the run."""
-    page = Path(evaluators.__file__).with_name("README.md").read_text(encoding="utf-8")
+    page = Path(evaluators.__file__).with_name("machines.md").read_text(encoding="utf-8")
     (script,) = re.findall(r"^```bash\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     with socket.socket() as free:
         free.bind(("", 0))

@@ -2,6 +2,7 @@
 
 import functools
 import hashlib
+import json
 
 import measured
 import measured_intervals
@@ -86,11 +87,8 @@ def test_the_blind_predictions_are_as_they_were_committed():
 
 
 def test_the_page_shows_its_records():
-    rows = measured.measured_rows()
-    tables = [measured.intervals_table(rows[name]) for name in measured.KNOWN]
-    tables += [measured.totals_table(rows["known"], by) for by in ("kind", "structure")]
-    for table in (*tables, measured.blind_table(rows["blind"], rows["anew"])):
-        assert table.markdown() in PAGE
+    numbers = json.loads((measured.HERE / measured.NUMBERS).read_text(encoding="utf-8"))
+    assert measured.page(numbers, measured.measured_rows()) == PAGE
 
 
 def test_blind_forces_hold_and_blind_heights_do_not_until_the_supports_stay_in_place():
@@ -179,10 +177,18 @@ def test_the_jumpers_heights_are_from_its_lowest_node():
     assert 0.0 < found["height 2"] < found["height 3"] < 6.0 < 150.0 < found["height 4"]
 
 
+def test_lifts_of_laika_are_in_the_middle_of_their_recorded_draws():
+    case = measured_intervals.cases()["blind_laika"]
+    middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
+    (found,) = case.predict([(case.scenario(), middle)])
+    rows = measured_intervals.predicted("blind_laika", case).set_index("quantity")
+    assert found == pytest.approx(rows["median"].to_dict(), rel=0.02)
+
+
 @pytest.mark.slow
 def test_bowed_tubes_lower_the_simplex_under_a_high_load_only():
     loads = [float(load) for load in LOADS]
-    case = measured_intervals.simplex_loads_case(1.5, loads, means=True)
+    case = measured_intervals.case_of("simplex_loads", loads=loads)
     middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
     straight, bowed = case.predict(
         [(case.scenario(), middle | {"bow of the tubes": bow}) for bow in (0.0, 3e-3)]
@@ -192,7 +198,7 @@ def test_bowed_tubes_lower_the_simplex_under_a_high_load_only():
 
 
 def test_a_longer_tube_stresses_all_members_of_the_simplex_by_the_published_mode():
-    case = measured_intervals.simplex_tightened_case((2.0, 8.0))
+    case = measured_intervals.case_of("anew_simplex_tightened", lengthenings=[2, 8])
     middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
     (force,) = case.predict([(case.scenario(), middle)])
     added = {member: force[f"{member} at +8 mm"] - force[f"{member} at +2 mm"] for member in MODE}
@@ -203,7 +209,10 @@ def test_a_longer_tube_stresses_all_members_of_the_simplex_by_the_published_mode
 def test_totals_count_the_intervals_that_hold_the_measured_value():
     rows = pandas.DataFrame({"kind": ["shape", "shape"], "median": [1.0, 2.2], "low": [0.9, 2.1]})
     rows = rows.assign(high=[1.1, 2.3], measured=[1.0, 2.0])
-    lines = measured.totals_table(rows, "kind").rows
-    assert lines[0] == ["shape", "1 of 2 (50 %)", "0.1 mm", "1.41"] and lines[1][0] == "all"
-    lines = measured.totals_table(rows.assign(kind="force"), "kind").rows
-    assert lines[0] == ["force", "1 of 2 (50 %)", "5.0 %", "1.41"]
+    found = measured.totals(rows, "kind")
+    assert [*found] == ["shape", "all"] and found["shape"] == found["all"]
+    assert found["shape"] == (2, 1, "0.1 mm", pytest.approx(2.0**0.5))
+    of_forces = measured.totals(rows.assign(kind="force"), "kind")["force"]
+    assert of_forces == (2, 1, "5.0 %", pytest.approx(2.0**0.5))
+    twice = measured.totals(pandas.concat([rows, rows]), "kind")
+    assert (twice["all"].total, twice["all, repeated tests once"].total) == (4, 2)

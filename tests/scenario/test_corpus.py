@@ -23,7 +23,10 @@ def test_every_file_is_a_structure_with_a_source() -> None:
 
 def test_the_page_has_every_structure_as_measured() -> None:
     assert set(ROWS) == set(corpus.names())
-    assert corpus.PAGE.read_text(encoding="utf-8") == corpus.page(ROWS)
+    structures, known = corpus.tables(ROWS)
+    assert corpus.PAGE.read_text(encoding="utf-8") == corpus.page(structures, known)
+    for name, table in (("structures", structures), ("known", known)):
+        assert (corpus.FOLDER / f"{name}.csv").read_text("utf-8") == corpus.csv(table)
 
 
 @pytest.mark.parametrize("name", ROWS)

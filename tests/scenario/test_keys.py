@@ -34,7 +34,7 @@ def test_an_editor_knows_units_defaults_tags_and_keys_that_files_alone_have():
     for key, node in schema["properties"].items():
         for kind in (kind["title"] for kind in members_of(node, schema) if "title" in kind):
             tags += [f"{kind} mapping", *([] if needs_keys(key, kind) else [f"{kind} scalar:null"])]
-    page = (SCENARIOS / "README.md").read_text(encoding="utf-8")
+    page = (SCENARIOS / "FORMAT.md").read_text(encoding="utf-8")
     (told,) = re.findall(r'"yaml.customTags": (\[.*?\])', page, re.S)
     assert json.loads(told) == list(dict.fromkeys(tags))
 
@@ -49,11 +49,19 @@ def needs_keys(section: str, kind: str) -> bool:
 
 
 def test_each_key_and_each_metric_is_explained():
-    lines = [line for line in keys_page().splitlines() if line.startswith("| `")]
-    cells = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
-    rows = {key.strip("`"): rest for key, *rest in cells}
+    rows = dict(re.findall(r"^- `([^`]+)` \(.*?\): (.*)$", keys_page(), re.M))
     for key in load_scenario("robust").values():
         if TAG not in key and not key.startswith(("objective", "disturbances.spreads")):
             assert key in rows, key
     assert METRICS.keys() <= rows.keys()
-    assert [key for key, cells in rows.items() if not cells[-1]] == []
+    assert [key for key, text in rows.items() if not text] == []
+
+
+def test_what_kinds_of_a_section_have_in_common_is_told_once():
+    winch, motor = (
+        keys_page().split(f"`actuation`: `{tag}`\n")[1] for tag in ("!Winch", "!TensionMotor")
+    )
+    assert "- `actuation.max_force` (N, > 0): " in winch.split("\n## ")[0]
+    own = motor.split("\n## ")[0]
+    assert "- `actuation.max_force` and `actuation.max_speed`: as for `!Winch`" in own
+    assert "- `actuation.time_constant` (s, > 0): " in own  # with another default

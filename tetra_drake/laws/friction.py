@@ -207,11 +207,9 @@ def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
 
 
 class ResetIntegrator(FrictionKind):
-    """Friction of the thesis (Table 2, Eq. 3-5), independent of the load.
-
-    A bristle holds a node until it is bent by `stiction_range`. See laws.friction. The thesis's
-    text can be read in other ways: the settings `stiffness`, `reset`, `breaks_free` and `load`
-    choose them.
+    """Friction of the thesis (Table 2, Eq. 3-5), independent of the load. A bristle holds a node
+    until it is bent by `stiction_range`. See laws.friction. `stiffness`, `reset`, `breaks_free` and
+    `load` choose other readings of the thesis's text.
     """
 
     modes = "0 sticks, +1 or -1 slips in that direction along the tangent"
@@ -441,10 +439,8 @@ def time_to_tangent_change(
 
 
 class Coulomb(FrictionKind):
-    """Friction that grows with the load, and may depend on the direction of slip relative to the
-    heading of the node's body.
-
-    A bristle holds a node until its force exceeds `static` times the load. See laws.friction.
+    """Friction that grows with the load, and may depend on the direction of slip. A bristle holds a
+    node until its force exceeds `static` times the load. See laws.friction.
     """
 
     modes = "0 sticks, else the signs of the direction of slip"

@@ -104,12 +104,10 @@ def _read_heights(path: str) -> np.ndarray:
 
 
 class HeightField(Relief):
-    """Heights in m from a file. Rows are along x and columns along y, in ascending order.
-
-    The grid's centre is the origin. The file is numpy's `.npy`, or text of numbers separated by
-    blanks or commas. It has at least 3 x 3 and at most 4 million heights. A relative path starts in
-    the folder of the scenario file that names it. A record keeps a copy of the file, named by a
-    digest of the heights.
+    """Heights in m from a file: numpy's `.npy`, or text of numbers separated by blanks or commas.
+    Rows are along x and columns along y, ascending; the grid's centre is the origin. There are at
+    least 3 x 3 and at most 4 million heights. A relative path starts in the folder of the scenario
+    file. A record keeps a copy of the file, named by a digest of the heights.
     """
 
     file: HeightPath

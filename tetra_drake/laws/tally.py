@@ -222,9 +222,9 @@ class TalliedMetrics:
     """Metrics that are computed from the tally of all steps of a simulation."""
 
     rolled: float = metric("rad", "forward positive", total("rolled"))
-    """Angle by which the robot has rolled forward, about the world's y axis, at the end. Whole
+    """Angle by which the robot has rolled forward, about the world's y axis, at the end; whole
     turns count. It is the integral of the angular velocity of the rigid motion that fits the nodes'
-    velocities best, so a change of shape alone does not count."""
+    velocities best, so a change of shape does not count."""
     actuator_work: float = metric("J", "of all actuators", total("effort.work"), is_cost=True)
     """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
     max(0, -S dl/dt) for driven cables with signal S and length l."""
@@ -243,9 +243,8 @@ class TalliedMetrics:
         lambda walk: sum(walk.lifted_shares) / len(walk.lifted_shares),
         is_share=True,
     )
-    """Share of the steady stretch during which a body is off the ground, mean over the bodies. A
-    body is off the ground if no contact node of it bears a normal force. In MuJoCo this metric says
-    little."""
+    """Share of the steady stretch during which no contact node of a body bears a normal force, mean
+    over the bodies. In MuJoCo it says little."""
     clearance: float = metric("m", "smallest gap of struts' axes", total("clearance"), least=True)
     """Least distance, at any time, between the axes of struts of two bodies. Struts overlap if it
     is less than their diameter: the model does not prevent this."""
@@ -255,8 +254,7 @@ class TalliedMetrics:
         "N", "without the start; a cable can pull a winch backward", total("effort.peak_force")
     )
     """Greatest load of an actuator in the steady stretch: the tension of its cable, without what
-    the cable's own spring exerts beside an actuator with limits. It leaves out the start, where
-    signals that set in pull harder for less than a millisecond. It exceeds the `max_force` of a
+    the cable's own spring exerts beside an actuator with limits. It exceeds the `max_force` of a
     winch while the robot stretches the cable faster than the stalled winch pays out."""
     mean_actuator_force: float = metric("N", "of all driven cables", mean("impulse"), is_cost=True)
     """Mean load of the actuators in the steady stretch."""

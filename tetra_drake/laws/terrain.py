@@ -440,12 +440,10 @@ class Incline(Relief):
 
 
 class Steps(Relief):
-    """Stairs across the robot's path, from x = `start` on.
-
-    Each step has a depth and a height: h = height min(count, floor((x - start) / depth) + 1), and 0
-    before `start`. An edge is not vertical: it rises over one cell of the grid of heights before it
-    and one behind it. A cell is about as long as a step is high, but at most a quarter of the
-    depth. Round feet with a radius above twice the height meet sharp edges.
+    """Stairs across the robot's path: h = height min(count, floor((x - start) / depth) + 1), and 0
+    before x = `start`. An edge rises over one cell of the grid before it and one behind it; a cell
+    is about as long as a step is high, at most a quarter of the depth. Round feet with a radius
+    above twice the height meet sharp edges.
     """
 
     place = "over steps"
@@ -473,10 +471,8 @@ class Steps(Relief):
 
 class Rough(Relief):
     """Random ground, interpolated smoothly between the heights of a grid. Neighbours are half a
-    wavelength apart. Their heights are independent and uniform between -2 amplitude and 0.
-
-    The mean height is -amplitude. A robot that stands at z = 0 touches the ground without sinking
-    in.
+    wavelength apart, with independent heights, uniform between -2 amplitude and 0, so that a robot
+    at z = 0 touches the ground without sinking in.
     """
 
     place = "on rough ground"
@@ -498,12 +494,10 @@ class Rough(Relief):
 
 
 class Obstacles(Relief):
-    """Round bumps, h = height max(0, 1 - (r / radius)^2) at the distance r from a bump's centre.
-    Where bumps overlap, the highest counts.
-
-    Each square of side `spacing` has one bump, at a random position. No bump reaches before
-    `start`. The ground is interpolated smoothly between the heights of a grid, so a bump's top is
-    about an eighth lower.
+    """Round bumps, h = height max(0, 1 - (r / radius)^2) at the distance r from a bump's centre;
+    the highest counts. Each square of side `spacing` has one, at a random position; none reaches
+    before `start`. The ground is interpolated smoothly between the heights of a grid, so a bump's
+    top is about an eighth lower.
     """
 
     place = "over obstacles"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -452,3 +452,13 @@ class Blueprint:
     @property
     def _least_distance(self) -> float:
         return TOLERANCE * float(np.linalg.norm(np.ptp(self.p_WN, axis=0)))
+
+
+def cable_numbers(names: Iterable[str]) -> dict[str, int]:
+    """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its nodes
+    in either order."""
+    numbers: dict[str, int] = {}
+    for number, name in enumerate(names):
+        group, *nodes = name.split()
+        numbers[name] = numbers[" ".join((group, *nodes[::-1]))] = number
+    return numbers

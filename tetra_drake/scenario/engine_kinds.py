@@ -35,10 +35,9 @@ class Drake(EngineSettings):
 
     module: ClassVar[str] = "tetra_drake.engines.drake"
     scheme: Literal["radau3", "runge_kutta3"] | None = None
-    """Integrator: implicit (radau3) or explicit (runge_kutta3). If not given, radau3 for up to 12
-    bodies. For n bodies above it is runge_kutta3, unless dampers stop the fastest motion at a rate
-    above 14 n² per second: the work of radau3 grows with n², the work of runge_kutta3 with the
-    rate."""
+    """Integrator: implicit (radau3) or explicit (runge_kutta3). By default radau3 for up to 12
+    bodies; for n more it is runge_kutta3, unless dampers stop the fastest motion at a rate above 14
+    n² per second: the work of radau3 grows with n², the work of runge_kutta3 with the rate."""
     accuracy: float | None = Field(default=None, gt=0)
     """Target accuracy per step. If not given, half the least damping ratio of a cable, anchor or
     joint with the robot's mass, from 2e-5 to 0.005: longer steps of radau3 would damp vibrations

@@ -10,8 +10,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.robot_structure import cable_numbers
+from tetra_drake.scenario.blueprint import Blueprint, cable_numbers
 from tetra_drake.settings.quantities import Keyed, Time
 from tetra_drake.settings.refusals import hint, refuse
 from tetra_drake.settings.section import Section
@@ -29,7 +28,7 @@ class Event(Section):
     tension, and its actuator turns freely."""
     lose: list[str] = Field(default=[])
     """Point masses that fall off: nodes in `masses` of a structure, or bodies with a `payload` of a
-    row. The rest of the body keeps its velocity."""
+    row. The rest keeps its velocity."""
     change: Keyed[str, float | str] = Field(default={})
     """New numbers by scenario key, such as friction.static, of the ground and its friction."""
 

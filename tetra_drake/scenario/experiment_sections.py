@@ -34,8 +34,8 @@ class EvolutionSection(Section):
     trials: int = Field(ge=1, le=1000)
     """Number of independent trials, each with another seed."""
     evaluations: int = Field(ge=1)
-    """Number of gaits that a trial evaluates, unless it ends early. !SteadyState evaluates its
-    population, then two gaits in each iteration."""
+    """Number of gaits that a trial evaluates, unless it ends early: for !SteadyState its
+    population, then two in each iteration."""
     time_budget: Time = Field(gt=0)
     """Longest wall time of a simulation; one that takes longer counts as failed."""
 
@@ -53,23 +53,21 @@ class Cuts(Section):
 
 
 class Disturbances(Section):
-    """Random changes of robot and surroundings during evolution. A draw is one set of such changes.
-
-    Every gait is simulated once in each draw. All gaits of an iteration have the same draws. Each
-    draw also has another terrain seed, if the terrain has a seed.
+    """Random changes of robot and surroundings during evolution. A draw is one set of such changes,
+    and another terrain seed if the terrain has one. Every gait is simulated once in each draw; all
+    gaits of an iteration have the same draws.
     """
 
     draws: int = Field(ge=1, le=10_000)
-    """Number of draws. Each gait is simulated once in each draw."""
+    """Number of draws."""
     spreads: Annotated[Keyed[str, Spread], AfterValidator(different_keys)] = Field(default={})
-    """Relative spreads of numbers, by scenario key. Each draw multiplies the number by a factor
-    from 1 - spread to 1 + spread. Keys joined by commas get the same factor."""
+    """Relative spreads by scenario key: a draw multiplies the number by a factor from 1 - spread to
+    1 + spread. Keys joined by commas get the same factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)
-    """Largest displacement of a body at t = 0 along x, y and up, as a share of the spacing of
-    tetrahedra, or of the shortest strut of a structure. Each draw displaces every body."""
+    """Largest displacement of each body at t = 0 along x, y and up, as a share of the spacing of
+    tetrahedra, or of the shortest strut of a structure."""
     cuts: Cuts | None = Field(default=None, exclude_if=operator.not_)
-    """Cables that break in each draw; none if not given. A gait that copes is one that walks in all
-    draws."""
+    """Cables that break in each draw."""
     tail: float = Field(default=1.0, gt=0, le=1)
-    """Share of the draws, the worst ones, whose mean is a gait's fitness (the conditional value at
-    risk). 1 is the mean over all draws. At least one draw counts."""
+    """Share of the draws, the worst ones and at least one, whose mean is a gait's fitness (the
+    conditional value at risk)."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
-from tetra_drake.formatting import TextTable
+from tetra_drake.formatting import listed
 from tetra_drake.scenario.metrics import METRICS, Metrics
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
@@ -26,10 +26,9 @@ _INTRODUCTION = """\
 
 `python -m tetra_drake.scenario.keys` writes this page. See [Scenarios](README.md) for examples.
 
-- A quantity may have any unit that converts to the one given here.
-- A key without a default is in your file or in its `base`.
-- Of the kinds of a section, the first needs no tag. NAME stands for a name of your choice,
-  [0] for any item of a list."""
+A quantity may have any unit that converts to the one given here. A key that has no default and is
+not optional is in your file or in its `base`. Of the kinds of a section, the first needs no tag.
+NAME stands for a name of your choice, [0] for any item of a list."""
 
 _WORDS = {"string": "text", "boolean": "true or false"}
 _LIMITS = {
@@ -38,6 +37,9 @@ _LIMITS = {
     "exclusiveMaximum": "< {}",
     "maximum": "≤ {}",
 }
+_ABOUT_METRICS = """\
+`require` limits a cost from above, any other metric from below. Some metrics are of the named
+robots alone."""
 _LENGTHS = {"minItems": "≥ {} items", "maxItems": "≤ {} items"}
 
 
@@ -68,38 +70,46 @@ def keys_page() -> str:
     parts, others = [_INTRODUCTION], []
     schema = Scenario.model_json_schema()
     for key, node in schema["properties"].items():
-        items = node.get("items")
+        items, told = node.get("items"), dict[str, str]()
         sections = [one for one in members_of(items or node, schema) if "$ref" in one]
         inner = f"{key}[0]" if items else key
         for section in sections:
-            parts.append(
-                f"## `{inner}`" + (f": `{section['title']}`" if "title" in section else "")
-            )
+            title = section.get("title", "")
+            parts.append(f"## `{inner}`" + (f": `{title}`" if title else ""))
             parts.append(" ".join(section["description"].split()))
             rows = [row for row in keys_in(section, schema, inner) if "description" in row[1]]
-            parts += [_table_of_keys(rows)] if rows else []
+            parts.append(_list_of_keys(rows, told, title))
         others += [] if sections else [(key, node)]
-    parts += ["## Other keys", _table_of_keys(others)]
+    parts += ["## Other keys", _list_of_keys(others, {}, "")]
     metrics, texts = [], attribute_docstrings(Metrics)
     for name, metric in METRICS.items():
-        limit = "at most" if metric.is_cost else "at least"
-        metrics.append((f"`{name}`", metric.unit or "1", limit, metric.needs or "any", texts[name]))
-    headings = ["metric", "unit", "`require`", "robots", "what it is"]
-    parts += ["## Metrics", " ".join((Metrics.__doc__ or "").split())]
-    parts.append(TextTable(headings, metrics, range(5)).markdown())
-    return "\n\n".join(parts) + "\n"
+        about = [metric.unit or "1", "cost" if metric.is_cost else "", metric.needs]
+        text = " ".join(texts[name].split())
+        metrics.append(f"- `{name}` ({', '.join(filter(None, about))}): {text}")
+    parts += ["## Metrics", " ".join((Metrics.__doc__ or "").split()), _ABOUT_METRICS]
+    parts.append("\n".join(metrics))
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def _table_of_keys(rows: Iterable[tuple[str, Tree]]) -> str:
-    cells = []
+def _list_of_keys(rows: Iterable[tuple[str, Tree]], told: dict[str, str], kind: str) -> str:
+    """Keys of a kind of a section as a list. `told` has the lines of other kinds of the section by
+    key, each with its kind; equal ones are not repeated."""
+    lines, again = [], dict[str, list[str]]()
     for key, node in rows:
         default = json.dumps(node["default"]).strip('"') if "default" in node else ""
         if default in ("null", "[]", "{}"):
-            default = "none"
-        elif default and "unit" not in node:
-            default = f"`{default}`"
-        cells.append((f"`{key}`", _value(node), default, node["description"]))
-    return TextTable(["key", "value", "default", "what it is"], cells, range(4)).markdown()
+            default = "optional"
+        elif default:
+            default = f"default {default}" if "unit" in node else f"default `{default}`"
+        value = _value(node) + (f"; {default}" if default else "")
+        line = f"- `{key}` ({value}): {' '.join(node['description'].split())}"
+        if line in told:
+            again.setdefault(told[line], []).append(f"`{key}`")
+        else:
+            lines.append(line)
+            told[line] = kind
+    lines += [f"- {listed(keys)}: as for `{first}`" for first, keys in again.items()]
+    return "\n".join(lines)
 
 
 def _value(node: Tree) -> str:
@@ -120,6 +130,8 @@ def _value(node: Tree) -> str:
     if "enum" in node or "const" in node:
         words = " or ".join(f"`{member}`" for member in node.get("enum", [node.get("const")]))
     limits = [text.format(plainest(node[n], unit)) for n, text in _LIMITS.items() if n in node]
+    if {"minimum", "maximum"} <= node.keys():
+        limits = [f"{plainest(node['minimum'], unit)} to {plainest(node['maximum'], unit)}"]
     lengths = [text.format(node[n]) for n, text in _LENGTHS.items() if n in node]
     if len(lengths) == 2 and node["minItems"] == node["maxItems"]:
         lengths = [f"{node['minItems']} items"]

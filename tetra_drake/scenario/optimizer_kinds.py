@@ -57,11 +57,10 @@ class SteadyState(OptimizerSettings):
 
 
 class CmaEs(OptimizerSettings):
-    """Settings of covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
-
-    Vectors of gait parameters are drawn from a normal distribution that adapts to the fittest. A
-    search that has converged restarts around its best gait, with twice the population. Where a
-    search has stalled, a new one begins elsewhere.
+    """Settings of covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772): gaits are drawn
+    from a normal distribution that adapts to the fittest. A search that has converged restarts
+    around its best gait, with twice the population; where it has stalled, a new one begins
+    elsewhere.
     """
 
     population: int | None = Field(default=None, ge=4, le=MOST_GAITS)
@@ -70,10 +69,9 @@ class CmaEs(OptimizerSettings):
     sample: int = Field(default=40, ge=0, le=MOST_GAITS)
     """Size of the sample: the random gaits that are evaluated before each search."""
     starts: int = Field(default=5, ge=1, le=1000)
-    """Number of searches that are tried out, for 1,000 evaluations each; the search with the best
-    gait continues. A search starts at the mean of the best quarter of its sample. Without a sample,
-    the first starts in the middle of the ranges, the others start at random gaits. The searches
-    take at most half of the evaluations, so there may be fewer."""
+    """Number of searches that are tried out, for 1,000 evaluations each and half of all at most;
+    the one with the best gait continues. A search starts at the mean of the best quarter of its
+    sample; without a sample, the first in the middle of the ranges, the others at random gaits."""
 
 
 class RandomSearch(OptimizerSettings):
@@ -84,11 +82,10 @@ CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
 class QualityDiversity(OptimizerSettings):
-    """Settings of a search for a map of two metrics with the fittest gait in each cell.
-
-    It needs the package's extra `qd`. The method is CMA-MAE by pyribs (Fontaine and Nikolaidis,
-    arXiv 2205.10752). Each cell has a level of fitness, which slowly follows its fittest gait.
-    Several runs of CMA-ES look for gaits above the level of their cell.
+    """Settings of a search for a map of two metrics with the fittest gait in each cell, by CMA-MAE
+    of pyribs (extra `qd`; Fontaine and Nikolaidis, arXiv 2205.10752). A cell's level of fitness
+    slowly follows its fittest gait; several runs of CMA-ES look for gaits above the level of their
+    cell.
     """
 
     module: ClassVar[str] = "tetra_drake.lab.elites.quality_diversity"

@@ -29,13 +29,11 @@ Reading = Literal[
 
 
 class RollingPolicy(PolicyKind):
-    """Policy that rolls a robot: each cable is shortened by a polynomial in x and z.
-
-    They are the place of the cable's middle in the world frame from the robot's centre, in units of
-    half the first strut. All cables have the same polynomial, so the robot keeps its shape in the
-    world frame while it rolls through it. A clock changes the polynomial a little, so that the
-    robot does not come to rest. The parameters are the coefficients of 1, x, z, x², xz, z², sx and
-    sz, where s is the sine of the clock.
+    """Policy that rolls a robot: each cable is shortened by the same polynomial in x and z, the
+    place of its middle in the world frame from the robot's centre, in units of half the first
+    strut. So the robot keeps its shape in the world frame while it rolls through it. A clock keeps
+    it from coming to rest. The parameters are the coefficients of 1, x, z, x², xz, z², sx and sz,
+    where s is the sine of the clock.
     """
 
     tag = "Rolling"
@@ -71,8 +69,8 @@ class SensingPolicy(PolicyKind):
     readings: list[Reading] = Field(default=["clock", "lengths", "normal_forces"], min_length=1)
     """Readings that the policy gets; see the class Readings. `clock` is sine and cosine of a clock.
     Lengths of cables are changes since the start, as shares; rates are shares per second. Forces
-    are in units of the robot's weight. Positions of nodes are from the robot's centre, in units of
-    the first strut, and velocities in this unit per second."""
+    are in units of the robot's weight, positions of nodes from the robot's centre in units of the
+    first strut, velocities in this unit per second."""
     clock: Time = Field(default=1.0, gt=0)
     """Period of the clock."""
 
@@ -115,9 +113,9 @@ class SensingPolicy(PolicyKind):
 
 
 class LinearPolicy(SensingPolicy):
-    """Linear policy: each output is a bias plus a weighted sum of the readings, at least -1 and at
-    most 1. It is multiplied by the usual amplitude of an oscillator network's signals: half of
-    `cpg.gain` times `cpg.external_input`."""
+    """Linear policy: each output is a bias plus a weighted sum of the readings, limited to -1 to 1,
+    times the usual amplitude of a network's signals: half of `cpg.gain` times
+    `cpg.external_input`."""
 
     tag = "Linear"
 
@@ -130,9 +128,8 @@ class LinearPolicy(SensingPolicy):
 
 
 class NetworkPolicy(SensingPolicy):
-    """Neural network with one hidden layer, whose neurons and outputs have the activation tanh. The
-    outputs are multiplied by the usual amplitude of an oscillator network's signals: half of
-    `cpg.gain` times `cpg.external_input`."""
+    """Neural network with one hidden layer, whose neurons and outputs have the activation tanh,
+    times the same amplitude as for !Linear."""
 
     tag = "Network"
 
@@ -153,12 +150,10 @@ class NetworkPolicy(SensingPolicy):
 
 
 class PythonPolicy(PolicyKind):
-    """Policy of your own: a function that Python imports.
-
-    function(readings, parameters, robots) gets the Readings of N robots, the parameters (N,
-    parameters) of the policy of each, and the constants of the robots, a DrivenRobots. It returns
-    setpoints (N, driven) of the actuators in SI units, like the actions of a Simulation: forces,
-    free lengths or tensions by the kind of `actuation`.
+    """Policy of your own. function(readings, parameters, robots) gets the Readings of N robots, the
+    parameters (N, parameters) of each, and the robots' constants, a DrivenRobots. It returns
+    setpoints (N, driven) of the actuators in SI units: forces, free lengths or tensions by the kind
+    of `actuation`.
     """
 
     tag = "Python"

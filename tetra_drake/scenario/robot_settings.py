@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import pydantic
 
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.tolerances import split_tolerances
-from tetra_drake.settings.section import Section, Tree
+from tetra_drake.settings.section import Kinds, Section, Tree
 
 ROW = "row of tetrahedra"
 """Property that metrics of the thesis's robot need."""
@@ -23,6 +23,13 @@ class RobotSettings(Section):
 
     lacking: ClassVar[tuple[str, ...]] = (ROW,)
     """Properties that some metrics need and this robot does not have; see scenario.metrics."""
+    if TYPE_CHECKING:  # fields of the kinds, each at its place in a file
+        gravity: Any
+        offsets: Any
+        tolerances: Any
+
+        @property
+        def unit(self) -> str | None: ...
 
     _split = pydantic.model_validator(mode="before")(split_tolerances)
 
@@ -45,3 +52,17 @@ class RobotSettings(Section):
         """Further changes that follow from `changes` to the robot `base`: none, so the mapping is
         empty. Rows of tetrahedra adapt their spacing."""
         return {}
+
+
+RobotKind = Annotated[
+    RobotSettings,
+    Kinds(
+        RobotSettings,
+        more=[
+            "tetra_drake.scenario.robot_tetrahedra:Tetrahedra",
+            "tetra_drake.scenario.robot_structure:StructureFile",
+        ],
+    ),
+]
+"""Robot of a scenario: a row of tetrahedra or a structure. A mapping without a tag is a
+Tetrahedra."""

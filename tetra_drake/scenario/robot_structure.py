@@ -13,7 +13,7 @@ import math
 import operator
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -22,9 +22,8 @@ from pydantic import Field
 
 from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_stretch
 from tetra_drake.laws.model import WORLD
-from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia
+from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
-from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.scenario.structure_graph import (
     Member,
     Pair,
@@ -48,7 +47,6 @@ from tetra_drake.settings.quantities import (
 )
 from tetra_drake.settings.refusals import described, hint, refuse
 from tetra_drake.settings.section import (
-    Kinds,
     Section,
     Varied,
     mapped,
@@ -106,16 +104,14 @@ class StrutGroup(Section):
     file."""
     contact_radius: Length | None = Field(default=None, ge=0)
     """Radius of the sphere about each end that touches the ground; by default the sphere's radius,
-    else the strut's. 0 for a ground that acts on the centres of nodes. The default is 0 for nodes
-    that anchors hold along z. A bar with round ends rolls about its axis, if no cable is off the
-    axis."""
+    else the strut's; 0 for nodes that anchors hold along z. With 0 the ground acts on the centres
+    of nodes. A bar with round ends rolls about its axis, if no cable is off the axis."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
-    """Axial force per shortening of a strut, E A / l; none for rigid struts. Without load, a strut
-    is as long as the distance of its nodes in the file. In equilibrium, the axial force shortens
-    it, and natural frequencies include its stiffness; in motion it keeps its length. Frequencies
-    leave out the inertia of its elongation. If a strut is 17, 3.3 or 1 times as stiff as its cable,
-    the first frequency is 0.25, 1.2 or 4 % higher than with finite-element rods, and the second is
-    0.75, 3.7 or 12 % higher."""
+    """Axial force per shortening of a strut, E A / l; none for rigid struts. A strut without load
+    is as long as the distance of its nodes in the file. Its force shortens it in equilibrium, and
+    natural frequencies include its stiffness; in motion it keeps its length. Frequencies leave out
+    the inertia of its elongation: if a strut is 17, 3.3 or 1 times as stiff as its cable, the first
+    is 0.25, 1.2 or 4 % higher than with finite-element rods, the second 0.75, 3.7 or 12 %."""
 
 
 class SphereGroup(Section):
@@ -137,8 +133,8 @@ class CableGroup(CableConstants):
     """Cables with the same constants. They never push."""
 
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
-    """The nodes that each cable joins. A cable with more than two nodes, such as [a, b, c], runs
-    over frictionless rings at its inner nodes; it has one tension."""
+    """The nodes that each cable joins. A cable such as [a, b, c] runs over frictionless rings at
+    its inner nodes, with one tension."""
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Tension per elongation."""
     free_length: Length | None = Field(default=None, ge=0)
@@ -150,7 +146,7 @@ class CableGroup(CableConstants):
         list[Annotated[float, Field(gt=0)]],
     ] = Field(default={}, exclude_if=operator.not_)
     """Factors of a number for each cable, in the order of `pairs`, such as `stiffness: [1, 0.98,
-    1.01]`, where the cables of the group are not quite alike."""
+    1.01]`."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> CableGroup:
@@ -203,10 +199,10 @@ class JoinedBody(Section):
     centre: Coordinates | None = None
     """Centre of mass [x, y, z] where the nodes are as in the file."""
     inertia: Annotated[list[InertiaQuantity], Field(min_length=3, max_length=6)] | None = None
-    """Moments of inertia [xx, yy, zz] about the centre of mass, along the axes of the file, where
-    the nodes are as in the file. [xx, yy, zz, xy, xz, yz] also has the products, which are the
-    elements of the matrix (xy is the integral of -x y dm). Without it, the inertia of the parts
-    grows in proportion to the mass."""
+    """Moments of inertia [xx, yy, zz], or with the matrix's products [xx, yy, zz, xy, xz, yz] (xy
+    is the integral of -x y dm), about the centre of mass, along the axes of the file, where the
+    nodes are as in the file. By default the inertia of the parts grows in proportion to the
+    mass."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> JoinedBody:
@@ -251,9 +247,9 @@ class StructureFile(RobotSettings):
     spheres: Keyed[Name, SphereGroup] = Field(default={})
     joints: Keyed[Name, BallJoint] = Field(default={})
     pinned: list[str] = Field(default=[], exclude=True)
-    """Nodes at which struts of several bodies are held together by ball joints. Without, struts
-    that share a node are one body. The first strut's body has the node; each other body has a copy
-    of it, such as n-2 and n-3 for n, and a joint with the same name."""
+    """Nodes at which ball joints hold struts together; elsewhere struts that share a node are one
+    body. The first strut's body has the node; each other body has a copy, such as n-2 and n-3 for
+    n, and a joint with the same name."""
     joint_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
     """Stiffness of pinned nodes, and of joints that give none. The default is the same as for
     anchors."""
@@ -269,13 +265,13 @@ class StructureFile(RobotSettings):
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
-    """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
-    and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
+    """Axes along which the world holds nodes, such as xyz: a node of a strut by a spring and a
+    damper from its place in the file; a node of no strut is fixed there."""
     anchor_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness that holds a node of a strut along each axis of its anchor. By default it is 1000
-    times the stiffness of all cables, and at least so great that the robot's weight moves the node
-    by a hundredth of a millimetre per metre of the robot's length. It is no greater than 1e8 / s²
-    times the mass of the lightest body, or 1000 times the stiffness of the stiffest cable."""
+    """Stiffness that holds a node of a strut along each axis of its anchor. By default 1000 times
+    the stiffness of all cables, at least so great that the robot's weight moves the node by 0.01 mm
+    per metre of the robot's length, and at most 1e8 / s² times the mass of the lightest body, or
+    1000 times the stiffest cable."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness of an anchor. With less than 1 ms, a stiff anchor vibrates, and
     steps are short."""
@@ -287,12 +283,12 @@ class StructureFile(RobotSettings):
     """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
     its anchors."""
     ignored: list[str] | None = None
-    """Settings of an imported file that have no effect, because the scenario has its own friction,
-    ground and actuators. They are noted when the file is read."""
+    """Settings of an imported file that have no effect, as the scenario has its own friction,
+    ground and actuators; noted when the file is read."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
     """Tolerances of numbers of the robot by key, such as `cables.side.stiffness: 2 %`,
-    `struts.bar.length: 1 mm` or `nodes: 1 mm`; or in the text of a number, such as `200 N/m ± 2
-    %`. They do not change the robot; td.predict and td.fit use them."""
+    `struts.bar.length: 1 mm` or `nodes: 1 mm`; or in the text of a number: `200 N/m ± 2 %`.
+    td.predict and td.fit use them; the robot does not change."""
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.
@@ -645,18 +641,3 @@ class ParametricRobot(RobotSettings):
     def _check(self) -> Self:
         self.blueprint().check_sizes()
         return check_tolerances(self)
-
-
-RobotKind = Annotated[Tetrahedra | StructureFile, Kinds(RobotSettings)]
-"""Robot of a scenario: a row of tetrahedra or a structure. A mapping without a tag is a
-Tetrahedra."""
-
-
-def cable_numbers(names: Iterable[str]) -> dict[str, int]:
-    """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its nodes
-    in either order."""
-    numbers: dict[str, int] = {}
-    for number, name in enumerate(names):
-        group, *nodes = name.split()
-        numbers[name] = numbers[" ".join((group, *nodes[::-1]))] = number
-    return numbers

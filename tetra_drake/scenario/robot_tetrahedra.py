@@ -99,9 +99,9 @@ class Tetrahedra(RobotSettings):
     """Density of struts and spheres."""
     cables: RowCables
     spacing: Annotated[Spacing, Varied()] = Field(ge=0)
-    """Distance between base triangles at t = 0. `balanced` (or 0) computes the spacing at which the
-    cables balance. It is also the default in a file that changes the strut length, or the cables'
-    stiffness or free length, of its base."""
+    """Distance between base triangles at t = 0. `balanced` (or 0): where the cables balance; also
+    the default in a file that changes the strut length, or the cables' stiffness or free length, of
+    its base."""
     gravity: Acceleration = Field(ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
@@ -110,7 +110,8 @@ class Tetrahedra(RobotSettings):
     """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
-    tip of the foremost; no other node reaches flat ground. `all`: all four of every tetrahedron."""
+    tip of the foremost, the only ones that reach flat ground. `all`: all four of every
+    tetrahedron."""
     actuation: list[Annotated[list[CableName], Field(min_length=1)]] = Field(
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )

@@ -58,10 +58,10 @@ class Scenario(World):
 
     gait_bounds: GaitBounds
     evolve: Annotated[BodyBounds, Field(exclude_if=operator.not_)] = Field(default={})
-    """Bounds of the numbers of the robot that evolve together with the gait, by scenario key, such
-    as `robot.cables.side.stiffness: [50 N/m, 400 N/m]` or `robot.nodes.n3[2]` for a coordinate z.
-    Keys that are joined by commas get the same value. Each candidate is a robot of its own, at its
-    own equilibrium. Equal bounds fix a number. A file replaces all bounds of its base."""
+    """Bounds of numbers of the robot that evolve with the gait, by scenario key, such as
+    `robot.cables.side.stiffness: [50 N/m, 400 N/m]`, or `robot.nodes.n3[2]` for a coordinate z.
+    Keys joined by commas get the same value. Equal bounds fix a number. A file replaces all bounds
+    of its base."""
     objective: Annotated[dict[str, float], *by_name(_OF_WEIGHTS), Field(min_length=1)]
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
@@ -69,9 +69,8 @@ class Scenario(World):
     """Limits of metrics: a gait that does not meet one counts as failed. A file replaces all limits
     of its base."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers by scenario key, such as `ground.stiffness: 20 % uniform`, besides the
-    robot's; or in the text of a number, such as `20 kN/m ± 20 %`. They do not change a simulation;
-    td.predict and td.fit use them."""
+    """Tolerances of numbers besides the robot's, by scenario key, such as `ground.stiffness: 20 %
+    uniform`; or in the text of a number: `20 kN/m ± 20 %`."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()

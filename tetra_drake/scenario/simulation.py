@@ -27,8 +27,8 @@ class SimulationSection(Section):
     control_period: Time = Field(default=0.02, gt=0)
     """Time between actions of a controller. See td.Simulation."""
     max_speed: Speed | None = Field(default=None, gt=0)
-    """Speed of a body above which a simulation has diverged. If not given, a speed that the energy
-    of fall, cables and actuators cannot give; at least 10.16 m/s."""
+    """Speed of a body above which a simulation has diverged. By default more than the energy of
+    fall, cables and actuators can give; at least 10.16 m/s."""
 
     @property
     def settling_time(self) -> float:

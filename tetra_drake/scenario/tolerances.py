@@ -40,14 +40,13 @@ class Tolerance(Section):
     mm uniform` or `2 % each`."""
 
     size: str
-    """Standard deviation of a normal law, or half the width of a uniform one: a share of the
-    number, such as `2 %`, or a quantity, such as `1 mm`. 0 for an exact number."""
+    """Standard deviation of a normal law, or half the width of a uniform one: a share, such as `2
+    %`, or a quantity, such as `1 mm`. 0 for an exact number."""
     law: Literal["normal", "uniform"] = "normal"
     """Law of the error."""
     each: bool = False
-    """True if each cable, strut or number has an error of its own, as from machining. Otherwise all
-    numbers of the key have one error in common, as a number of a supplier. Coordinates always have
-    errors of their own."""
+    """True if each cable, strut or number has an error of its own, as from machining; otherwise all
+    have one in common, as from a supplier. Coordinates always have their own."""
     source: str = "assumed"
     """Where the tolerance is from, such as a paper or a data sheet."""
 

@@ -18,11 +18,11 @@ from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
 from tetra_drake.laws.oscillator import CpgSection, GaitBounds, GaitParameter
 from tetra_drake.laws.terrain import Flat, Terrain
-from tetra_drake.scenario.blueprint import Blueprint
+from tetra_drake.scenario.blueprint import Blueprint, cable_numbers
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
 from tetra_drake.scenario.events import Event, check_taken, up_to_each
 from tetra_drake.scenario.policies import Policy
-from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
+from tetra_drake.scenario.robot_settings import RobotKind
 from tetra_drake.scenario.simulation import SimulationSection
 from tetra_drake.settings.refusals import TAG, hint, refuse
 from tetra_drake.settings.section import Section, Tree, flattened

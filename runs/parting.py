@@ -1,0 +1,66 @@
+"""Where two runs part that search with the same seeds on two engines.
+
+A search depends on its seed and on the fitnesses that it is told. So the search of a trial is
+repeated here with the fitnesses of its record, without simulations, and asks for the gaits that it
+asked for then. Two runs ask for the same gaits until a fitness differs by so much that another gait
+is chosen, or replaced.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas
+
+from tetra_drake.evolution.run import Run
+from tetra_drake.optimizers import optimizer_of
+from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.robot.gait import ParameterSpace, Vector
+
+
+def made(run: Run, trial: int) -> pandas.DataFrame:
+    """The evaluations of a trial. Index: index."""
+    return run.evaluations[run.evaluations["trial"] == trial].set_index("index")
+
+
+def asked(run: Run, trial: int) -> list[Vector]:
+    """The parameter vectors for which the search of a trial asked, in the order of its
+    evaluations."""
+    scenario = run.scenario
+    seed = np.random.SeedSequence(run.manifest.seed).spawn(scenario.evolution.trials)[trial]
+    make, space = optimizer_of(scenario.optimizer), ParameterSpace.of(scenario)
+    optimizer = make(space, scenario.evolution, np.random.default_rng(seed))
+    told = made(run, trial)["fitness"].fillna(-np.inf).tolist()
+    vectors: list[Vector] = []
+    while len(vectors) < len(told):
+        first = len(vectors)
+        vectors += optimizer.ask()
+        if len(vectors) <= len(told):
+            optimizer.tell([Evaluation(fitness) for fitness in told[first : len(vectors)]])
+    return vectors[: len(told)]
+
+
+def partings(first: Run, second: Run) -> pandas.DataFrame:
+    """Where the trials of `first` part from the same trials of `second`. Index: trial.
+
+    Columns: evaluations (of `first`), alike (of them, at the begin: the same gaits in both), apart
+    (in, median difference of their distances), farthest (in, the largest), first_best and
+    second_best (in, distance of the fittest gait among as many evaluations of each run as `first`
+    has).
+    """
+    rows = {}
+    for trial in range(first.scenario.evolution.trials):
+        pairs = zip(asked(first, trial), asked(second, trial), strict=False)
+        differs = [not np.array_equal(one, other) for one, other in pairs]
+        alike = [*differs, True].index(True)
+        ours, theirs = made(first, trial), made(second, trial)
+        apart = (ours["distance_in"] - theirs["distance_in"]).abs().head(alike)
+        best = [gaits.loc[gaits["fitness"].head(len(ours)).idxmax()] for gaits in (ours, theirs)]
+        rows[trial] = {
+            "evaluations": len(ours),
+            "alike": alike,
+            "apart": apart.median(),
+            "farthest": apart.max(),
+            "first_best": best[0]["distance_in"],
+            "second_best": best[1]["distance_in"],
+        }
+    return pandas.DataFrame.from_dict(rows, orient="index").rename_axis("trial")

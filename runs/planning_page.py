@@ -1,0 +1,209 @@
+"""Page and pictures of the planned rover, from its records; see planning.py."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from page import rendered
+from PIL import Image
+from record import load_times
+from records import read
+
+from tetra_drake.figures.style import save_figure
+from tetra_drake.files import read_text, write_whole
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.scenario.yaml_text import parse_yaml
+
+HERE = Path(__file__).parent / "planning"
+RECORDS, FILM = "records.jsonl", "slalom.gif"
+EPISODES = parse_yaml(read_text(HERE / "episodes.yaml", "episodes"), "episodes.yaml")
+"""What is run, see the file."""
+GROUPS = (
+    "goals, compiled",
+    "courses",
+    "goals, MuJoCo",
+    "goals, disturbed",
+    "speeds",
+    "others",
+    "real time",
+)
+"""Groups of episodes, in the order of the runs."""
+NEAR, PILLAR = 0.3, 0.1
+"""Distance (m) of the centre from a goal that is reached, and radius (m) of pillars."""
+CORES = 2
+"""Number of cores that a decision may use for its whole period."""
+FRAME, COLOURS = 0.2, 12
+"""Time between the film's pictures in s, and number of their colours."""
+VIEW, TALL = math.radians(40.0), 0.6
+"""Angle (rad) from the horizontal at which the film looks down, and height (m) of its pillars."""
+
+Record = dict[str, Any]
+"""Record of an episode; see planning.recorded()."""
+
+
+def load_records(folder: Path) -> dict[tuple[str, str], Record]:
+    """Records in a folder by group and name of the episode. A line that an interruption has cut
+    off does not count."""
+    return {(record["group"], record["name"]): record for record in read(folder / RECORDS)}
+
+
+def centre_of(p_WN: np.ndarray) -> np.ndarray:
+    """Horizontal centre (..., 2) of nodes (..., nodes, 3)."""
+    return np.asarray(p_WN[..., :2].mean(axis=-2))
+
+
+# The film
+
+
+def film(result: SimulationResult, pillars: Sequence[Sequence[float]], file: Path) -> None:
+    """Writes a GIF of a robot among pillars, seen obliquely, at twice its speed."""
+    structure, trajectory = result.robot.structure, result.trajectory
+    times, nodes = trajectory.time.values, trajectory.p_WN.values
+    path = _seen(np.pad(centre_of(nodes), ((0, 0), (0, 1))))
+    figure = Figure(figsize=(5.6, 2.1))
+    canvas, pictures = FigureCanvasAgg(figure), []
+    ends = structure.segments.ends
+    for sample in np.searchsorted(times, np.arange(0.0, result.duration, FRAME)):
+        figure.clear()
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.plot(*path[: sample + 1].T, color="C0", linewidth=0.8)
+        seen = _seen(nodes[sample])
+        behind = centre_of(nodes[sample])[1]
+        for x, y in pillars:
+            draw_pillar(axes, x, y, zorder=1 if y > behind else 4)
+        axes.plot(*seen[ends].transpose(2, 1, 0), color="0.6", linewidth=0.6, zorder=2)
+        axes.plot(
+            *seen[structure.struts].transpose(2, 1, 0), color="black", linewidth=1.8, zorder=3
+        )
+        axes.set(xlim=(-0.5, 6.5), ylim=(-1.2, 1.42), aspect="equal")
+        axes.set_axis_off()
+        canvas.draw()
+        picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+        pictures.append(picture.quantize(COLOURS))
+    pace = round(500.0 * FRAME)
+    pictures[0].save(file, save_all=True, append_images=pictures[1:], duration=pace, loop=0)
+
+
+def _seen(points: np.ndarray) -> np.ndarray:
+    """Places (..., 2) in a picture of points (..., 3) seen obliquely from above."""
+    across = math.sin(VIEW) * points[..., 1] + math.cos(VIEW) * points[..., 2]
+    return np.stack([points[..., 0], across], axis=-1)
+
+
+def draw_pillar(axes: Axes, x: float, y: float, *, zorder: float) -> None:
+    """Draws a pillar at a place, seen obliquely."""
+    around = np.linspace(0.0, math.tau, 40)
+    ring = np.stack([x + PILLAR * np.cos(around), y + PILLAR * np.sin(around)], axis=-1)
+    low, high = (_seen(np.pad(ring, ((0, 0), (0, 1)), constant_values=z)) for z in (0.0, TALL))
+    outline = np.vstack([low[20:], high[:21]])
+    axes.fill(*outline.T, color="C1", zorder=zorder)
+    axes.fill(*high.T, color="C1", edgecolor="white", zorder=zorder + 0.1)
+
+
+# The page
+
+
+def goals_figure(groups: Mapping[str, Sequence[Record]]) -> Figure:
+    """Paths to the goals, a panel for each group."""
+    figure = Figure(figsize=(8.0, 3.0), layout="constrained")
+    panels = figure.subplots(1, len(groups))
+    for axes, (name, records) in zip(panels, groups.items(), strict=True):
+        for record in records:
+            (goal,) = record["places"]
+            axes.plot(*np.transpose(record["path"]), linewidth=0.8)
+            axes.add_patch(Circle(goal, NEAR, color="0.8", zorder=0))
+        axes.set(title=name, aspect="equal", xlim=(-3.6, 3.6), ylim=(-3.6, 3.6), xlabel="x (m)")
+    panels[0].set(ylabel="y (m)")
+    return figure
+
+
+def courses_figure(records: Sequence[Record]) -> Figure:
+    """Paths among pillars, with the circles around the places to pass."""
+    figure = Figure(figsize=(8.0, 6.6), layout="constrained")
+    names = [record["name"] for record in records]
+    cells = [*(names[:1] or ["."]) * (12 - len(names[1:])), *names[1:]]  # the slalom is wider
+    panels = figure.subplot_mosaic(np.reshape(cells, (3, 4)).tolist())
+    for record in records:
+        axes = panels[record["name"]]
+        axes.plot(*np.transpose(record["path"]), linewidth=0.8)
+        for place in record["places"]:
+            axes.add_patch(Circle(place, NEAR, color="0.8", zorder=0))
+        for place in record["pillars"]:
+            axes.add_patch(Circle(place, PILLAR, color="C1"))
+        axes.set_title(record["name"], fontsize="medium")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.autoscale_view()
+        axes.tick_params(labelsize=7)
+    figure.supxlabel("x (m)", fontsize="medium")
+    figure.supylabel("y (m)", fontsize="medium")
+    return figure
+
+
+def speeds(records: Sequence[Record], name: str) -> np.ndarray:
+    """Median, least and greatest body lengths per second of the episodes whose names begin so."""
+    found = [each["relative_speed"] for each in records if each["name"].startswith(name)]
+    return np.percentile(found or [math.nan], [50, 0, 100])
+
+
+def costs(times: Sequence[Sequence[float]], limit: float) -> dict[str, float]:
+    """Number of decisions and numbers of their times (s), a list for each episode, with the share
+    within a limit (s)."""
+    decisions = np.concatenate(times)
+    middle, most_of, most = np.percentile(decisions, [50, 95, 100])
+    kept = float(np.mean(decisions <= limit))
+    return {"count": len(decisions), "median": middle, "p95": most_of, "most": most, "kept": kept}
+
+
+def write_page(folder: Path, planned: Mapping[str, int]) -> None:
+    """Writes the page of the records in a folder, and its pictures. `planned` are the numbers of
+    episodes by group."""
+    groups: dict[str, list[Record]] = {group: [] for group in GROUPS}
+    for (group, _), record in load_records(folder).items():
+        groups[group].append(record)
+    goals = {name: records for name, records in groups.items() if name.startswith("goals")}
+    save_figure(goals_figure(goals), folder, "goals", kinds=["svg"])
+    save_figure(courses_figure(groups["courses"]), folder, "courses", kinds=["svg"])
+    plants, period = EPISODES["engines"], EPISODES["planner"]["decision_period"]
+    level = {
+        ground: {plant: speeds(groups["speeds"], f"{ground}, {plant}, seed") for plant in plants}
+        for ground in EPISODES["level"]
+    }
+    usual, alike = ([middle for middle, *_ in each.values()] for each in level.values())
+    slopes = [f"{degrees} degrees, friction {mu:g}" for degrees, mu in EPISODES["slopes"]]
+    walls = [record["wall"] for record in groups["real time"]]
+    cpu = [each for records in goals.values() for record in records for each in record["cpu"]]
+    text = rendered(
+        "planning.md",
+        runs_of=[f"{len(each)} of {planned[group]} ({group})" for group, each in groups.items()],
+        groups=groups,
+        goals=goals,
+        costs={
+            name: costs([record["cpu"] for record in records], CORES * period)
+            for name, records in groups.items()
+            if records
+        },
+        walls=costs(walls, period) if walls else None,
+        plants=[*plants],
+        level=level,
+        slower=1.0 - usual[1] / usual[0],
+        alike=max(alike) / min(alike) - 1.0,
+        slopes={
+            slope: [speeds(groups["speeds"], f"{slope}, {plant}")[0] for plant in plants]
+            for slope in slopes
+        },
+        climbs=[each for each in EPISODES["others"] if "climb" in each],
+        others={record["name"]: record for record in groups["others"]},
+        samples=EPISODES["planner"]["samples"],
+        film=FILM,
+        evolved=load_times(HERE.parent)["rolling"]["evolution"]["cores_s"],
+        second=float(np.mean(cpu)) / period,
+    )
+    write_whole(folder / "README.md", text)
