@@ -38,7 +38,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LinearSystem, LogVectorOutput, MatrixGain
 
 from tetra_drake.figures.style import common_style, make_figure, save_figure
-from tetra_drake.laws.oscillator import Network
+from tetra_drake.laws.matsuoka import Network
 from tetra_drake.robot.measures import dominant_frequency
 from tetra_drake.systems import MatsuokaCpg
 

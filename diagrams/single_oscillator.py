@@ -32,7 +32,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
 from tetra_drake.figures.style import common_style, make_figure, save_figure
-from tetra_drake.laws.oscillator import Network
+from tetra_drake.laws.matsuoka import Matsuoka, Network
 from tetra_drake.options import quantity
 from tetra_drake.robot.measures import dominant_frequency
 from tetra_drake.scenario.load import load_scenario
@@ -58,6 +58,7 @@ def make_diagram(
     """Diagram of a network with one oscillator, and a log of its signal. With `meshcat` it shows
     the signal."""
     cpg = scenario.cpg
+    assert isinstance(cpg, Matsuoka)
     network = Network.of(
         [[0.0, weight], [weight, 0.0]],
         tau_a=tau_a,
@@ -67,7 +68,7 @@ def make_diagram(
     neurons = MatsuokaCpg(
         network,
         tonic=cpg.external_input,
-        initial_state=cpg.initial_neurons(oscillators=1),
+        initial_state=np.repeat(cpg.initial_state, [2, 1, 1]),
         gain=cpg.gain,
     )
     builder = DiagramBuilder()
@@ -101,6 +102,7 @@ def linear_frequency(
     """Theoretical frequency in Hz while both neurons fire."""
     tau_b = ratio * tau_a
     damping = (1.0 / tau_b - (weight - 1.0) / tau_a) / 2.0
+    assert isinstance(scenario.cpg, Matsuoka)
     stiffness = (scenario.cpg.self_inhibition_weight + 1.0 - weight) / (tau_a * tau_b)
     return math.sqrt(stiffness - damping**2) / (2.0 * math.pi)
 

@@ -14,7 +14,7 @@ import pandas
 from tetra_drake.evolution.run import Run
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 
 
 def made(run: Run, trial: int) -> pandas.DataFrame:

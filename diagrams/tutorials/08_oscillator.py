@@ -10,7 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain
 
-from tetra_drake.laws.oscillator import Network
+from tetra_drake.laws.matsuoka import Network
 from tetra_drake.systems import MatsuokaCpg
 
 network = Network.of([[0.0, 2.0], [2.0, 0.0]], tau_a=0.25, tau_b=0.5, self_inhibition_weight=2.5)

@@ -14,7 +14,7 @@ from helpers.gaits import with_values
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.laws.oscillator import Weights
+from tetra_drake.laws.matsuoka import Weights
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.parameter_space import seeded_gait

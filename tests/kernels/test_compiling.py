@@ -18,10 +18,9 @@ from tetra_drake.kernels.compiling import LOGGER, compiled, compiling_time
 
 PROGRAM = """
 import numpy as np
-from tetra_drake.laws.oscillator import oscillator_output
-neurons, output = np.eye(2, 9), np.empty(1)
-oscillator_output(neurons, output)
-print(output[0])
+from tetra_drake.laws.kinematics import interpolate_state
+state = np.eye(1, 13)[0]
+print(interpolate_state(state, state, 0.1, 1.0)[0])
 """
 
 
@@ -48,7 +47,7 @@ def run(package: Path, cache_home: Path, program: str = PROGRAM) -> str:
 def test_a_read_only_installation_caches_for_the_user_if_it_can(package, tmp_path, folder, caches):
     (tmp_path / "file").write_text("")
     assert float(run(package, tmp_path / folder)) == 1.0
-    assert any(tmp_path.rglob("oscillator.oscillator_output*.nbc")) == caches
+    assert any(tmp_path.rglob("kinematics.interpolate_state*.nbc")) == caches
 
 
 STAMPS = """
@@ -71,7 +70,7 @@ def stamps(package: Path, home: Path) -> dict[str, str]:
 
 def test_only_kernels_that_use_what_was_edited_are_compiled_anew(package, tmp_path):
     before = stamps(Path(tetra_drake.__file__).parents[1], tmp_path)
-    assert {"advance", "compute_ground_forces", "oscillator_output", "factorise"} <= before.keys()
+    assert {"advance", "compute_ground_forces", "state_signals", "factorise"} <= before.keys()
     for file in (package / "tetra_drake").rglob("*.py"):
         text = file.read_text("utf-8")
         text = text.replace('"""', '"""Once more. ', 1) + "# The end.\n"
@@ -86,7 +85,7 @@ def test_only_kernels_that_use_what_was_edited_are_compiled_anew(package, tmp_pa
     now = stamps(package, tmp_path)
     changed = {name for name in before if now[name] != before[name]}
     assert {"advance", "compute_ground_forces", "observe_states"} <= changed
-    assert not {"compute_cable_forces", "oscillator_output", "factorise"} & changed
+    assert not {"compute_cable_forces", "state_signals", "factorise"} & changed
 
 
 @pytest.mark.slow

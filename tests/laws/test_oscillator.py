@@ -8,19 +8,21 @@ import functools
 import numpy as np
 import pytest
 
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws.matsuoka import Matsuoka, Network
 from tetra_drake.laws.oscillator import (
-    Network,
-    U,
-    V,
-    correct_neurons,
-    make_neurons,
-    network_output,
-    predict_neurons,
+    VALUE,
+    Oscillators,
+    correct_states,
+    make_states,
+    predict_states,
+    write_outputs,
 )
 
 # While both neurons of this oscillator fire, Eq. 7 is linear, without kinks. Halving the step then
 # divides the error of a method by 2^order.
-LINEAR = Network.of([[0.0, 0.4], [0.4, 0.0]], tau_a=0.3, tau_b=0.6, self_inhibition_weight=2.5)
+NETWORK = Network.of([[0.0, 0.4], [0.4, 0.0]], tau_a=0.3, tau_b=0.6, self_inhibition_weight=2.5)
+LINEAR = Oscillators(Matsuoka.own, NETWORK)
 
 
 START = np.array([0.3, 0.25, 0.1, 0.12])
@@ -30,7 +32,7 @@ START = np.array([0.3, 0.25, 0.1, 0.12])
 def last_output(steps: int, *, listing: bool) -> np.ndarray:
     output = np.empty((steps if listing else steps + 1, 1))
     inputs = np.full((1, 2), 0.5)
-    network_output(LINEAR, inputs, 0.2 / steps, listing, make_neurons(START), output)
+    write_outputs(Packed((LINEAR, make_states(START))), inputs, 0.2 / steps, listing, output)
     return output[-1]
 
 
@@ -40,12 +42,12 @@ by_runge_kutta = functools.partial(last_output, listing=False)
 
 def by_heun(steps: int) -> np.ndarray:
     """Refuses each step once, and goes back to its start."""
-    neurons, inputs = make_neurons(START), np.full(2, 0.5)
+    states, inputs = make_states(START), np.full(2, 0.5)
     for _ in range(steps):
         for accepted in (False, True):
-            predict_neurons(LINEAR, inputs, 0.2 / steps, neurons)
-            correct_neurons(LINEAR, inputs, 0.2 / steps, accepted, neurons)
-    return neurons[:, [U, V]]
+            predict_states(LINEAR, inputs, 0.2 / steps, states)
+            correct_states(LINEAR, inputs, 0.2 / steps, accepted, states)
+    return states[:, VALUE]
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def test_a_scenario_that_loads_makes_a_robot_or_one_line(name, draws, tmp_path):
             scenario = load_scenario(tmp_path / "any.yaml")
             ends.append("loads")
             robot = Robot.of(scenario)
-            robot.network(seeded_gait(scenario))
+            robot.oscillators(seeded_gait(scenario))
         except InputError as error:
             assert len(str(error).splitlines()) == 1
         else:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tetra_drake.errors import InputError
-from tetra_drake.laws.oscillator import Weights
+from tetra_drake.laws.matsuoka import Weights
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
@@ -37,8 +37,8 @@ def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
     junction = Robot.of(near).senses.ahead[weights.couplings // 2]
     assert (np.abs(np.diff(junction, axis=1)) <= 1).all()
     gait = seeded_gait(near)
-    matrix = Robot.of(near).network(gait).inhibition
-    assert np.count_nonzero(matrix) == len(weights.couplings) + 16  # and the partners
+    network = Robot.of(near).oscillators(gait).constants
+    assert len(network.weight) == len(weights.couplings) + 16  # and the partners
     alone = scenario.with_changes({"cpg.reach": 0})
     assert [*seeded_gait(alone).parameters] == ["tau_A", "tau_B"]
 
@@ -89,4 +89,4 @@ def test_a_gait_that_does_not_fit_is_refused(scenario, robot, refused):
     fewer = {name: x for name, x in gait.parameters.items() if name != "weight 2->1 extensor"}
     gait = dataclasses.replace(gait, parameters=fewer)
     with refused(f"gait {gait.name}", "parameters", "'weight 2->1 extensor'"):
-        robot.network(gait)
+        robot.oscillators(gait)

@@ -18,7 +18,7 @@ from pydrake.systems.primitives import Linearize
 
 from tetra_drake.laws.actuator import Winch
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.laws.oscillator import Network
+from tetra_drake.laws.matsuoka import Network
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario

@@ -163,5 +163,5 @@ def check_scenario(scenario: Scenario) -> None:
     robot, gait = Robot.of(scenario), seeded_gait(scenario)
     driven = driven_robot(scenario, gait, robot=robot)
     if driven.oscillating is not None:
-        robot.network(driven.oscillating)
+        robot.oscillators(driven.oscillating)
     engine_of(scenario).check(scenario)

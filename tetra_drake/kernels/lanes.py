@@ -297,6 +297,23 @@ def _inverse_sqrt_by_newton(x):  # type: ignore[no-untyped-def]
 overload(inverse_sqrt)(lambda x: _inverse_sqrt_by_newton)
 
 
+_PI_HIGH, _PI_LOW = 3.1415926534682512, 1.2154201013012384e-10
+"""A part of pi with 33 bits, and the rest: multiples up to 2^20 of the first have no rounding."""
+
+
+@inlined
+def sine(x: Real) -> Real:
+    """sin(x) for numbers or lanes, with an error of at most 4e-16 up to 1e5, by Taylor's series in
+    half a turn. (numba calls the C library for each lane.)"""
+    half_turns = floor(x * (1.0 / math.pi) + 0.5)
+    y = (x - half_turns * _PI_HIGH) - half_turns * _PI_LOW
+    odd, z = half_turns - 2.0 * floor(0.5 * half_turns), y * y
+    series = 1.0 - z * (1.0 / 272.0) * (1.0 - z * (1.0 / 342.0))
+    for divisor in (210.0, 156.0, 110.0, 72.0, 42.0, 20.0, 6.0):
+        series = 1.0 - z * (1.0 / divisor) * series
+    return (1.0 - 2.0 * odd) * y * series
+
+
 def gather(numbers: Table, index: Real, offset: int) -> Real:
     """Reads numbers[index + offset], with a separate index for each lane. `numbers` (size,) has no
     lanes: all simulations share it. `index` has whole numbers, as floats."""

@@ -18,6 +18,7 @@ from numba.extending import overload, typeof_impl
 
 from tetra_drake.kernels.compiling import INLINED, F
 from tetra_drake.kernels.lanes import Table, named
+from tetra_drake.kernels.packed import PackedKind
 from tetra_drake.kernels.stamp import stamp
 
 
@@ -50,29 +51,36 @@ _own_type = functools.cache(OwnType)
 typeof_impl.register(OwnFunctions)(lambda functions, context: _own_type(functions))
 
 
-def with_own(name: str, shipped: F) -> F:
+def with_own(name: str, shipped: F | None = None) -> F:
     """Function of a law, which is its first argument.
 
     If the law has an OwnFunctions in the attribute `own`, it calls the function `name` of them with
     the remaining arguments, then the law's constants. Otherwise it calls `shipped` with all
-    arguments. Numba wants equal signatures: (law: Any, *more: Any).
+    arguments. The constants are a table, or a NamedTuple of tables, which is passed on as it is.
+    Numba wants equal signatures: (law: Any, *more: Any).
     """
 
     def call(law: Any, *more: Any) -> Any:
         if law.own is None:
-            return shipped(law, *more)
-        return getattr(law.own, name)(*more, named(law.own.constants, law.constants))
+            return shipped(law, *more)  # type: ignore[misc]
+        of_tables = isinstance(law.constants, tuple)
+        constants = law.constants if of_tables else named(law.own.constants, law.constants)
+        return getattr(law.own, name)(*more, constants)
 
     @overload(call, jit_options=INLINED)
     def implementation(law: Any, *more: Any) -> Any:
-        kind = law.members[law.names.index("own")]  # law is a PackedKind
-        if not isinstance(kind, OwnType):
+        kinds = dict(zip(law.names, law.members, strict=True))  # law is a PackedKind
+        if not isinstance(kinds["own"], OwnType):
             return shipped
-        function, constants = getattr(kind.functions, name), kind.functions.constants
+        functions = kinds["own"].functions
+        function, constants = getattr(functions, name), functions.constants
 
         def own(law: Any, *more: Any) -> Any:
             return function(*more, named(constants, law.constants))
 
-        return own
+        def of_tables(law: Any, *more: Any) -> Any:
+            return function(*more, law.constants)
+
+        return of_tables if isinstance(kinds["constants"], PackedKind) else own
 
     return cast(F, call)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tetra_drake.files import json_number
-from tetra_drake.laws.oscillator import TAU_B_PER_TAU_A
+from tetra_drake.laws.matsuoka import TAU_B_PER_TAU_A
 from tetra_drake.optimizers.base import Evaluation, Iteration, mean_fitness
 from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds

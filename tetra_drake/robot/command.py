@@ -13,7 +13,7 @@ import numpy as np
 
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.gait import Gait, check_gait
+from tetra_drake.robot.gait import Gait, check_parameters
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
@@ -119,7 +119,9 @@ def _piloted_robot(robot: Robot, gait: Gait, policy: PolicyKind) -> DrivenRobot:
     """A robot driven by its scenario's policy with the parameters of a gait, whose first signals
     act from the start on. Raises InputError if the gait has other parameters."""
     scenario, step = robot.scenario, robot.scenario.cpg.listing_step
-    values = np.array([*check_gait(gait, scenario).values()], dtype=float)
+    source, own = f"gait {gait.name}", scenario.parameters
+    given = check_parameters(gait.parameters, own, source=source, key="parameters")
+    values = np.array([*given.values()], dtype=float)
     controlled, structure = robot.controlled, robot.structure
     cables, struts = robot.starting_cables(), structure.p_WN[structure.struts]
     size = np.linalg.norm(np.diff(struts[0], axis=0)) if len(struts) else scenario.robot.size

@@ -75,20 +75,6 @@ def _four_digits(value: float | str) -> str:
     return f"{float(number):.4g}{blank}{unit}"
 
 
-def check_gait(
-    gait: Gait, scenario: World, *, source: object = "", key: str = ""
-) -> dict[str, float]:
-    """The parameters of a gait in the order of World.parameters. Raises InputError, naming
-    `source` (by default the gait) and key, if they do not fit, or if there is a turn and no
-    oscillator is left or right. `key` is the gait's key in the source."""
-    source, place = source or f"gait {gait.name}", f"{key}.parameters".strip(".")
-    values = check_parameters(gait.parameters, scenario.parameters, source=source, key=place)
-    if gait.turn and (scenario.policy is not None or not scenario.blueprint().sides.any()):
-        problem = f"found {gait.turn}, expected 0: no oscillator is left or right"
-        raise InputError(source, f"{key}.turn".strip("."), problem)
-    return values
-
-
 def check_parameters(
     given: Mapping[str, float],
     expected: Mapping[str, GaitParameter],

@@ -1,6 +1,5 @@
 """Gait files, and arguments that give a gait."""
 
-import dataclasses
 import json
 import os
 from pathlib import Path
@@ -11,7 +10,7 @@ from pydantic import Field
 import tetra_drake
 from tetra_drake.errors import InputError
 from tetra_drake.files import given_path, read_json, write_whole
-from tetra_drake.robot.gait import Gait, check_gait
+from tetra_drake.robot.gait import Gait, check_parameters
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -69,20 +68,23 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
     raw = read_json(given_path(path, "load_gait", "path"), "gait file")
     raw = raw.get(key) if key and isinstance(raw, dict) else raw
     scenario, file = given_scenario(scenario), GaitFile.from_tree(_renewed(raw), path, key=key)
+    place = f"{key}.parameters".strip(".")
     gait = Gait(
         name=file.name or Path(path).stem,
-        parameters=file.parameters,
+        parameters=check_parameters(file.parameters, scenario.parameters, source=path, key=place),
         turn=file.turn,
         body=tuple(file.body.items()),
         scenario=file.scenario,
     )
-    values = check_gait(gait, scenario, source=path, key=key)
+    if gait.turn and (scenario.policy is not None or not scenario.blueprint().sides.any()):
+        problem = f"found {gait.turn}, expected 0: no oscillator is left or right"
+        raise InputError(path, f"{key}.turn".strip("."), problem)
     try:
         with_body(scenario, gait)
     except InputError as error:
         place = f"{key}.body.{error.key}".strip(".")
         raise InputError(path, place, error.problem) from error
-    return dataclasses.replace(gait, parameters=values)
+    return gait
 
 
 class HasBestGait(Protocol):

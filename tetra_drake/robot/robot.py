@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -20,7 +20,7 @@ from tetra_drake.laws.feedback import Senses
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Bodies, Model
-from tetra_drake.laws.oscillator import Network, steered_input
+from tetra_drake.laws.oscillator import GaitParameter, Oscillators, steered_input
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.bodies import body_inertias
 from tetra_drake.robot.equilibrium import (
@@ -31,7 +31,7 @@ from tetra_drake.robot.equilibrium import (
     mass_matrix,
     stiffness_at_rest,
 )
-from tetra_drake.robot.gait import Gait, check_gait
+from tetra_drake.robot.gait import Gait, check_parameters
 from tetra_drake.robot.ground import lift, make_ground
 from tetra_drake.robot.steering import SteeringSignal, checked_turn
 from tetra_drake.robot.structure import Structure, with_origins
@@ -247,13 +247,24 @@ class Robot:
         )
         return Phase(events[-1].at, robot, p_BC)
 
-    def network(self, gait: Gait) -> Network:
-        """Constants of the oscillator network that a gait gives this robot. Raises InputError if
-        the gait does not fit the scenario, or this has a policy in place of oscillators."""
-        if self.scenario.policy is not None:
-            problem = f"expected a controller: scenario {self.scenario.name} has a policy"
-            raise InputError(f"gait {gait.name}", "", problem)
-        return self.scenario.cpg.network(self.structure, check_gait(gait, self.scenario))
+    def oscillators(self, gait: Gait) -> Oscillators:
+        """Oscillators with the numbers of a gait, for kernels. Raises InputError if the gait does
+        not fit the scenario."""
+        cpg = self.scenario.cpg
+        return Oscillators(cpg.own, cpg.constants(self.structure, self._checked(gait)))
+
+    def starting_oscillators(self, gait: Gait) -> np.ndarray:
+        """States (s,) of the oscillators at t = 0. Raises InputError as oscillators()."""
+        return self.scenario.cpg.starting_state(self.structure, self._checked(gait))
+
+    @functools.cached_property
+    def _parameters(self) -> Mapping[str, GaitParameter]:
+        return self.scenario.cpg.parameters(self.structure)
+
+    def _checked(self, gait: Gait) -> dict[str, float]:
+        """Parameters of a gait, by name. Raises InputError if they do not fit the oscillators."""
+        source = f"gait {gait.name}"
+        return check_parameters(gait.parameters, self._parameters, source=source, key="parameters")
 
     def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
         """Turns, -1 to 1: how much more input left oscillators have than right ones.
@@ -264,18 +275,19 @@ class Robot:
         InputError if a value is not between -1 and 1, or if no oscillator is on one side of the
         robot.
         """
+        if (steering or gait.turn) and not self.structure.sides.any():
+            source = "steering" if steering else f"gait {gait.name}"
+            raise InputError(source, "", "turns, but no oscillator is on one side of the robot")
         if steering is None:
             return np.array([gait.turn])
-        if not self.structure.sides.any():
-            raise InputError("steering", "", "no oscillator is on one side of the robot")
         step = self.scenario.cpg.listing_step
         times = step * np.arange(round(self.scenario.simulation.duration / step) + 1)
         return np.array([checked_turn(steering(time), time=time) for time in times.tolist()])
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
-        """Tonic input of each of the 2m neurons (..., 2m), for turns (...) from -1 to 1. It is
-        u0 (1 + turn) on the left, u0 (1 - turn) on the right, u0 for neither side."""
-        sides, u0 = np.repeat(self.structure.sides, 2), self.scenario.cpg.external_input
+        """Tonic input of both inputs of m oscillators (..., 2m), for turns (...) from -1 to 1. It
+        is u0 (1 + turn) on the left, u0 (1 - turn) on the right, u0 for neither side."""
+        sides, u0 = np.repeat(self.structure.sides, 2), self.scenario.cpg.tonic
         return np.asarray(steered_input(u0, turns[..., np.newaxis], sides))
 
     def starting_drives(self) -> np.ndarray:

@@ -16,8 +16,10 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
+from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.feedback import PATHWAYS
-from tetra_drake.laws.oscillator import Network, make_neurons, network_output
+from tetra_drake.laws.matsuoka import NO_NETWORK, Matsuoka
+from tetra_drake.laws.oscillator import Oscillators, make_states, write_outputs
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.steering import SteeringSignal
@@ -161,11 +163,17 @@ class DrivenRobot:
         return np.append(before, settings.duration)
 
     @property
-    def network(self) -> Network:
-        """Network that makes the signals. It has no neurons if the signals are given."""
+    def oscillators(self) -> Oscillators:
+        """Oscillators that make the signals; none if they are given."""
         if self.oscillating is not None:
-            return self.robot.network(self.oscillating)
-        return Network.of(np.zeros((0, 0)), tau_a=1.0, tau_b=1.0, self_inhibition_weight=0.0)
+            return self.robot.oscillators(self.oscillating)
+        return Oscillators(Matsuoka.own, NO_NETWORK)
+
+    @property
+    def starting_state(self) -> np.ndarray:
+        """States (s,) of the oscillators at t = 0; none if the signals are given."""
+        gait = self.oscillating
+        return self.robot.starting_oscillators(gait) if gait else np.zeros(0)
 
     @property
     def gains(self) -> np.ndarray:
@@ -208,13 +216,12 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
     if gains_of(gait).any():
         problem = "has feedback; its signals exist only while the robot is simulated"
         raise InputError(f"gait {gait.name}", "gains", problem)
-    network, turns = robot.network(gait), robot.turns(gait, steering)
+    turns = robot.turns(gait, steering)
     midway = 0.5 * (turns[:-1] + turns[1:]) if turns.size > 1 else turns
     inputs = robot.tonic_input(midway)
-    neurons = make_neurons(cpg.initial_neurons(oscillators))
+    parts = Packed((robot.oscillators(gait), make_states(robot.starting_oscillators(gait))))
     output = np.empty((DrivenRobot.of(robot, gait).sample_count, oscillators))
-    listing = cpg.signals == "listing"
-    network_output(network, inputs, cpg.listing_step, listing, neurons, output)
+    write_outputs(parts, inputs, cpg.listing_step, cpg.signals == "listing", output)
     return cpg.gain * np.vstack([output, output[-1:], output[-1:]])
 
 

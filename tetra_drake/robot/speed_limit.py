@@ -40,7 +40,7 @@ def speed_limit(driven: DrivenRobot) -> float:
         stretch = np.maximum(stretch, 0.0)
     pull = limits_of(robot.model.actuator).max_force
     if math.isnan(pull):  # actuators without limits
-        pull = max(abs(cpg.gain * cpg.external_input), np.abs(driven.samples).max(initial=0.0))
+        pull = max(2.0 * cpg.usual_amplitude, np.abs(driven.samples).max(initial=0.0))
     # A pull is at most the force that stretches the cable by its whole length.
     pulls = np.minimum(pull, elastic_tension(length, law)) * length
     energy = float(np.sum(elastic_energy(stretch, law)) + pulls[robot.driven].sum())

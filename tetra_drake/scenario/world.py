@@ -7,7 +7,7 @@ import functools
 import math
 import operator
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -16,7 +16,9 @@ from tetra_drake.laws.actuator import Actuation, Force
 from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
-from tetra_drake.laws.oscillator import CpgSection, GaitBounds, GaitParameter
+from tetra_drake.laws.matsuoka import Matsuoka
+from tetra_drake.laws.oscillator import CpgKind, GaitBounds, GaitParameter
+from tetra_drake.laws.phase import Phase
 from tetra_drake.laws.terrain import Flat, Terrain
 from tetra_drake.scenario.blueprint import Blueprint, cable_numbers
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
@@ -25,7 +27,7 @@ from tetra_drake.scenario.policies import Policy
 from tetra_drake.scenario.robot_settings import RobotKind
 from tetra_drake.scenario.simulation import SimulationSection
 from tetra_drake.settings.refusals import TAG, hint, refuse
-from tetra_drake.settings.section import Section, Tree, flattened
+from tetra_drake.settings.section import Kinds, Section, Tree, flattened
 from tetra_drake.settings.units import SYSTEMS, Units, current, fitting
 
 EngineT = TypeVar("EngineT", Drake, Compiled, Mujoco)
@@ -39,6 +41,11 @@ CHANGEABLE = "friction.", "ground."
 
 MOST_SAMPLES = 2_000_000
 """Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
+
+
+Cpg = Annotated[Matsuoka | Phase, Kinds(CpgKind, plain=True)]
+"""Oscillators of any kind, with their settings. A mapping without a tag is a !Matsuoka, and written
+so."""
 
 
 class World(Section):
@@ -57,7 +64,7 @@ class World(Section):
     terrain: Terrain = Flat()
     strut_contact: StrutContactKind = NoStrutContact()
     actuation: Actuation = Force()
-    cpg: CpgSection
+    cpg: Cpg
     policy: Policy | None = Field(default=None, exclude_if=lambda policy: policy is None)
     """A closed loop in place of the oscillator network; evolution searches its parameters. An empty
     key removes the base's."""

@@ -186,6 +186,8 @@ class Kinds:
     a file, a tag such as `!Winch` chooses the type of a mapping; a mapping without a tag is of the
     first type of the union.
 
+    With `plain`, the first type is written without its tag, as it was before it had others.
+
     With a `base` class, installed plug-ins can add types that derive from it, by entry points of a
     `group`; `more` names further types by their places, "module:class".
     A section with such a union is built when it is first used (defer_build), because plug-ins
@@ -196,9 +198,14 @@ class Kinds:
     """Base classes of the kinds that plug-ins can add to, by group."""
 
     def __init__(
-        self, base: type[Section] | None = None, group: str = KINDS, *, more: Sequence[str] = ()
+        self,
+        base: type[Section] | None = None,
+        group: str = KINDS,
+        *,
+        more: Sequence[str] = (),
+        plain: bool = False,
     ) -> None:
-        self.base, self.group, self.more = base, group, more
+        self.base, self.group, self.more, self.plain = base, group, more, plain
         self.bases[group] = *self.bases.get(group, ()), *([base] if base else ())
 
     def __get_pydantic_core_schema__(
@@ -215,7 +222,10 @@ class Kinds:
 
         tagged = [Annotated[kind, Tag(kind.tag), Field(title=f"!{kind.tag}")] for kind in kinds]
         union: Any = Union[tuple(tagged)]  # noqa: UP007
-        write = pydantic.WrapSerializer(lambda kind, dump: {TAG: kind.tag} | dump(kind))
+        untagged = kinds[0].tag if self.plain else None
+        write = pydantic.WrapSerializer(
+            lambda kind, dump: ({} if kind.tag == untagged else {TAG: kind.tag}) | dump(kind)
+        )
         return handler.generate_schema(Annotated[union, Discriminator(tag_of), write])
 
     def _added(self, tags: set[str], base: Any) -> Iterator[type]:

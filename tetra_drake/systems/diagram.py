@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import NoneType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
+from tetra_drake.laws.matsuoka import Matsuoka
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import gains_of, signal_samples
@@ -26,6 +28,7 @@ from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.attachment import Attach
 from tetra_drake.systems.cable_network import AddCables, Cable
+from tetra_drake.systems.cpg import Cpg
 from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import AddGroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
@@ -66,8 +69,9 @@ def MakeTensegrityDiagram(
     Subsystems:
 
     - cpg: only with a gait. With `cpg.signals: live` in the scenario, it is the network, integrated
-      with the robot (a live network); otherwise its signals, computed beforehand. A robot without
-      oscillators has no cpg.
+      with the robot (a live network): a MatsuokaCpg, or a Cpg for other kinds of oscillators.
+      Otherwise it is the network's signals, computed beforehand. A robot without oscillators has no
+      cpg.
     - steering: only for a live network with oscillators on the left or right
     - feedback: only if the scenario's `cpg.feedback` is not empty
     - cables_actuators: only if the kind of actuators has states, as winches have
@@ -335,13 +339,16 @@ def _AddSignals(
         return passed.get_output_port()
     if cpg.signals == "live":
         robot.turns(gait, steering)  # raises InputError for a wrong turn
-        network = MatsuokaCpg(
-            robot.network(gait),
-            tonic=cpg.external_input,
-            initial_state=cpg.initial_neurons(size),
-            gain=cpg.gain,
+        network = robot.oscillators(gait)
+        given: dict[str, Any] = {
+            "tonic": np.full(2 * size, cpg.tonic),
+            "initial_state": robot.starting_oscillators(gait),
+            "gain": cpg.gain,
+        }
+        is_matsuoka = network.own is Matsuoka.own
+        oscillators = builder.AddNamedSystem(
+            "cpg", MatsuokaCpg(network.constants, **given) if is_matsuoka else Cpg(network, **given)
         )
-        oscillators = builder.AddNamedSystem("cpg", network)
         if robot.structure.sides.any():
             turn = gait.turn if steering is None else steering
             steers = builder.AddNamedSystem("steering", Steering(robot.tonic_input, turn=turn))

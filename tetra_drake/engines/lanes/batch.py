@@ -110,11 +110,6 @@ class LaneBatch(Batch):
         state = self._places.states[place]
         self._put_constants(place, prepared.constants)
         self._heights[place, : heights.size] = heights
-        network = prepared.constants.network
-        for thread in self._threads:  # one range of inhibiting neurons, the widest, for all lanes
-            thread.first[:] = np.minimum(thread.first, network.first)
-            thread.beyond[:] = np.maximum(thread.beyond, network.beyond)
-
         marks, turns, samples = robot.marks, prepared.turns, robot.samples
         log.times[place] = log.marks[place] = math.inf
         log.times[place, : len(prepared.times)] = prepared.times
@@ -294,14 +289,9 @@ class LaneThread:
         self._lane_places = np.zeros_like(log.place)
         self._queue, self._waiting = np.zeros_like(places.queue), np.zeros_like(places.waiting)
         constants, constant_numbers = in_lanes(first.constants, width)
-        network, robot = constants.network, constants.robot
-        self.first, self.beyond = network.first.array, network.beyond.array
-        # A field of any size: one compiled kernel serves robots of any size.
-        inhibition = FieldArray(network.inhibition.array, width, any_size=True)
+        robot = constants.robot
         ground = robot.ground._replace(heights=FieldArray(heights.ravel()))
-        constants = constants._replace(
-            robot=robot._replace(ground=ground), network=network._replace(inhibition=inhibition)
-        )
+        constants = constants._replace(robot=robot._replace(ground=ground))
         lanes, states = in_lanes(first.start, width)
         self._status = lanes.clock.array[loop.STATUS]
         self._status[:] = loop.IDLE

@@ -76,11 +76,12 @@ class Constants(NamedTuple):
 
     robot: Model
     solver: Solver
-    network: oscillator.Network
+    oscillators: oscillator.Oscillators
     senses: Senses
     sides: Table
-    """Side of each neuron (2n,) for n oscillators: 1 left, -1 right, 0 neither."""
-    external_input: Table
+    """Side of each input (2n,) of n oscillators: 1 left, -1 right, 0 neither."""
+    tonic_input: Table
+    """Tonic input without steering."""
     gains: Table
     """Feedback gains, in the order of feedback.PATHWAYS."""
     gain: Table
@@ -113,9 +114,10 @@ class LaneState(NamedTuple):
     """Actuator signals (N) at the present time of each lane."""
     drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
     """States of the actuators at the present time of each lane."""
-    neurons: Annotated[Table, "2 * signals", oscillator.NEURON_COLUMNS]
+    oscillators: Annotated[Table, "states", oscillator.STATE_COLUMNS]
+    """Table `states` of the oscillators."""
     tonic: Annotated[Table, "2 * signals"]
-    """Tonic inputs of the neurons: their inputs without the feedback."""
+    """Tonic inputs of the oscillators: their inputs without the feedback."""
     tally: Tally
     step: StepMemory
     scratch: Annotated[Table, SCRATCH_ROWS]
@@ -129,7 +131,7 @@ class LaneState(NamedTuple):
     output: Annotated[Table, "signals"]
     """Latest outputs of the oscillators."""
     inputs: Annotated[Table, "2 * signals"]
-    """Total inputs of the neurons: tonic inputs and feedback."""
+    """Total inputs of the oscillators: tonic inputs and feedback."""
 
 
 class Log(NamedTuple):
@@ -205,7 +207,9 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     accepted = is_running & (error <= constants.tolerance[0])
     if live:
         feel(constants, lanes, log, step_end, lanes.step.end)
-        oscillator.correct_neurons(constants.network, lanes.inputs, step, accepted, lanes.neurons)
+        oscillator.correct_states(
+            constants.oscillators, lanes.inputs, step, accepted, lanes.oscillators
+        )
         drive(constants, lanes)
     if any_lane(accepted & (clock[DUE] <= step_end)):
         lanes.scratch[ACCEPTED] = select(accepted, 1.0, 0.0)
@@ -231,7 +235,9 @@ def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool
     clock = lanes.clock
     if live:
         feel(constants, lanes, log, clock[TIME], lanes.step.state)
-        oscillator.predict_neurons(constants.network, lanes.inputs, clock[STEP], lanes.neurons)
+        oscillator.predict_states(
+            constants.oscillators, lanes.inputs, clock[STEP], lanes.oscillators
+        )
         drive(constants, lanes)
         return
     run_ahead(constants, lanes, log, clock[END])
@@ -310,8 +316,8 @@ def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> 
         takes_step = is_unfinished & (clock[SAMPLES] < end_of_buffer)
         steer(constants, lanes, log, clock[SAMPLES] + 0.5)
         step = select(takes_step, period, 0.0)
-        oscillator.euler_step(constants.network, lanes.tonic, step, lanes.neurons)
-        oscillator.oscillator_output(lanes.neurons, lanes.output)
+        oscillator.euler_step(constants.oscillators, lanes.tonic, step, lanes.oscillators)
+        oscillator.outputs_of(constants.oscillators, lanes.oscillators, lanes.output)
         lanes.scratch[NETWORK_STEPS] = select(takes_step, 1.0, 0.0)
         samples, steps = by_lane(clock), by_lane(lanes.scratch)
         gain, output = by_lane(constants.gain), by_lane(lanes.output)
@@ -326,7 +332,7 @@ def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> 
 
 @inlined
 def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
-    """Writes the inputs of the neurons of a live network, tonic input plus feedback, to
+    """Writes the inputs of the oscillators of a live network, tonic input plus feedback, to
     `lanes.inputs`. They are for the robot's `state` (13*bodies,) at a time (s). A live network is
     integrated together with the robot."""
     steer(constants, lanes, log, time / constants.period[0])
@@ -337,7 +343,7 @@ def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Ta
 
 @inlined
 def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> None:
-    """Writes the tonic input of the neurons to `lanes.tonic`, for the turn at `sample`. Does
+    """Writes the tonic input of the oscillators to `lanes.tonic`, for the turn at `sample`. Does
     nothing if the turn is constant.
 
     `sample` is a position, in each lane, in the lane's row of `log.turns`, the turns (-1 to 1) over
@@ -349,21 +355,21 @@ def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> Non
     lanes.scratch[TURN_INDEX] = sample
     scratch, sides, tonic = by_lane(lanes.scratch), by_lane(constants.sides), by_lane(lanes.tonic)
     for lane in range(log.place.size):
-        position, external = scratch[TURN_INDEX, lane], by_lane(constants.external_input)[0, lane]
+        position, unsteered = scratch[TURN_INDEX, lane], by_lane(constants.tonic_input)[0, lane]
         i = max(0, min(int(position), turns - 2))
         place = log.place[lane]
         before, after = log.turns[place, i], log.turns[place, i + 1]
         turn = before + (min(position, turns - 1.0) - i) * (after - before)
         for k in range(lanes.tonic.size):
-            tonic[k, lane] = oscillator.steered_input(external, turn, sides[k, lane])
+            tonic[k, lane] = oscillator.steered_input(unsteered, turn, sides[k, lane])
 
 
 @inlined
 def drive(constants: Constants, lanes: LaneState) -> None:
     """Writes the signals (N) of a live network at the end of the step to `lanes.end_signals`: the
-    gain times the oscillators' outputs, but 0 before the start-up time. `lanes.neurons` must be at
-    the end of the step already."""
-    oscillator.oscillator_output(lanes.neurons, lanes.output)
+    gain times the oscillators' outputs, but 0 before the start-up time. `lanes.oscillators` must be
+    at the end of the step already."""
+    oscillator.outputs_of(constants.oscillators, lanes.oscillators, lanes.output)
     active, gain = lanes.clock[ACTIVE] != 0.0, constants.gain[0]
     for k in range(lanes.output.size):
         lanes.end_signals[k] = select(active, gain * lanes.output[k], 0.0)
@@ -410,7 +416,8 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
     True if the network is integrated together with the robot.
     """
     clock, signals, done = by_lane(lanes.clock), by_lane(lanes.signals), False
-    oscillator.oscillator_output(lanes.neurons, lanes.output)
+    if live:
+        oscillator.outputs_of(constants.oscillators, lanes.oscillators, lanes.output)
     for lane in range(log.place.size):
         if clock[STATUS, lane] != RUNNING or clock[TIME, lane] < clock[MARK, lane]:
             continue

@@ -15,7 +15,7 @@ from tetra_drake.engines.lanes.tables import shared
 from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws.actuator import DRIVE, limits_of
 from tetra_drake.laws.forces import sizes_of
-from tetra_drake.laws.oscillator import make_neurons
+from tetra_drake.laws.oscillator import make_states
 from tetra_drake.results.result import motion_times
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
@@ -57,6 +57,7 @@ class Prepared:
         rows = max(2.0 * longest / cpg.listing_step + 32.0, len(driven.samples))
         sizes = sizes_of(model) | {
             "signals": structure.signals,
+            "states": len(driven.starting_state),
             "blocks": len(solver.schedule.later),
             "marks": len(driven.marks) + 1,
             "times": len(times) + 1,
@@ -72,10 +73,10 @@ class Prepared:
         constants = Constants(
             robot=solver.oriented(model)._replace(ground=ground),
             solver=solver,
-            network=driven.network,
+            oscillators=driven.oscillators,
             senses=robot.senses,
             sides=np.repeat(structure.sides, 2).astype(float),
-            external_input=np.array([cpg.external_input]),
+            tonic_input=np.array([cpg.tonic]),
             gains=driven.gains,
             gain=np.array([cpg.gain]),
             period=np.array([cpg.listing_step]),
@@ -87,10 +88,7 @@ class Prepared:
             max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
             max_speed=np.array([speed_limit(driven)]),
         )
-        # All lanes have one range of inhibiting neurons, the widest; see LaneBatch.begin().
-        alike = constants.network._replace(first=np.zeros(0), beyond=np.zeros(0))
-        kind = driven.is_live, shared(constants._replace(network=alike))
-
+        kind = driven.is_live, shared(constants)
         start = allocate(LaneState, sizes)
         start.clock[loop.STATUS], start.clock[loop.DUE] = loop.DONE, times[1]
         start.clock[loop.PLANNED] = min(look_ahead(tolerance), longest)
@@ -100,7 +98,7 @@ class Prepared:
         start.modes[:] = robot.starting_modes
         start.signals[:] = robot.first_signals
         start.drives[:, DRIVE] = robot.starting_drives()
-        start.neurons[:] = make_neurons(cpg.initial_neurons(structure.signals))
+        start.oscillators[:] = make_states(driven.starting_state)
         start.tonic[:] = robot.tonic_input(turns)[0]
         return cls(driven, record, times, turns, sizes, constants, kind, start)
 
@@ -126,10 +124,11 @@ class Prepared:
             driven=driven,
             turns=turns,
             sizes=self.sizes | {"turns": len(turns)},
-            constants=self.constants._replace(network=driven.network, gains=driven.gains),
+            constants=self.constants._replace(oscillators=driven.oscillators, gains=driven.gains),
             start=self.start._replace(
                 signals=robot.first_signals,
                 drives=drives,
+                oscillators=make_states(driven.starting_state),
                 tonic=robot.tonic_input(turns)[0],
             ),
         )
