@@ -53,7 +53,7 @@ PICTURE, FILM = "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
 TIMES = "times.json"
-SO_FAR = "--so-far"
+SO_FAR, EVOLUTION = "--so-far", "evolution"
 
 
 @dataclass(frozen=True)
@@ -74,12 +74,12 @@ class Experiment:
     def scenario(self, name: str) -> Scenario:
         """Scenario of the run of this name."""
         base = load_scenario(self.base).on_engine(self.engine)
-        step = {} if "engine" in self.changes else _STEP
+        step = _STEP if self.engine == "compiled" else {}
         return base.with_changes({"name": name} | step | dict(self.changes))
 
 
 _STEP = {"engine.max_step": "3 ms"}
-"""The longest step of recorded runs, also where damping is light."""
+"""The longest step of runs on the compiled engine, also where damping is light."""
 
 
 def load_experiments(file: Path) -> dict[str, Experiment]:
@@ -110,7 +110,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     resume, progress = (made / MANIFEST).exists(), Progress(sys.stdout)
     if not resume:
         save_times(load_times(out) | {name: {}}, out)
-    with timed(name, "evolution", out):
+    with timed(name, EVOLUTION, out):
         # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
         evolve(scenario, made, resume=resume, reevaluate=False, report=False, progress=progress)
     publish(name, experiment, made, out=out)
@@ -119,8 +119,10 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
 def record_so_far(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> None:
     """Puts what there is of a run in `scratch`, which another process may evolve, into `out`."""
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / name
+        copy, times = Path(folder) / name, load_times(out)
         thin(scratch / name, copy, whole=True)
+        evolution = {key: time for key, time in times.get(name, {}).items() if key == EVOLUTION}
+        save_times(times | {name: evolution}, out)
         publish(name, experiment, copy, out=out, whole=True)
 
 

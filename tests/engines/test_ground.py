@@ -11,6 +11,7 @@ from helpers.states import energy_and_momenta
 from helpers.structures import poses_of, simulated
 from pydrake.systems.analysis import Simulator
 from scipy.integrate import solve_ivp
+from xarray import DataArray
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
@@ -21,7 +22,7 @@ from tetra_drake.robot.ground import ground_frames
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -92,6 +93,8 @@ PULLED = {
 }
 """HANGING, with its point mass on the ground. Its cables lift a third of its weight."""
 
+FIRM_GROUND = {"stiffness": 4000.0, "damping": 1e5}
+
 BRISTLE = {
     "stiction_range": 1e-4,
     "stiction_damping": 0.5,
@@ -127,19 +130,48 @@ def pulled_over_the_ground(start: float, times: np.ndarray) -> np.ndarray:
     return found
 
 
-@pytest.mark.parametrize(("engine", "atol"), [(CONVERGED["compiled"], 1e-7), (Drake(), 2e-5)])
-def test_a_mass_on_cables_breaks_free_as_an_integrator_with_resets_says(engine, atol):
-    friction = ResetIntegrator(reset="range", **BRISTLE)
-    starts, ground = np.array([0.008, -0.005]), GroundSection(stiffness=4000.0, damping=1e5)
-    weight = MASS * G - 2.0 * CABLE_STIFFNESS * 0.002
+def pulled(friction: ResetIntegrator, starts: np.ndarray, engine: Compiled | Drake) -> DataArray:
+    """Coordinates p_WN (m) of that point mass over time on an engine, from two starts (m), along x
+    and y at once."""
+    weight, ground = MASS * G - 2.0 * CABLE_STIFFNESS * 0.002, GroundSection(**FIRM_GROUND)
     low = -weight / (ground.stiffness + 2.0 * CABLE_STIFFNESS)
     tree = HANGING | PULLED | {"offsets": [[0.0] * 3, [*starts, low]]}
     changes = {"terrain": Flat(), "friction": friction, "ground": ground, "engine": engine}
     scenario = scenario_of(tree, duration=0.12, **changes)
     found = simulate(scenario, seeded_gait(scenario), record=True).trajectory
-    times = found.time.values
+    return found.p_WN.sel(node="p")
+
+
+@pytest.mark.parametrize(("engine", "atol"), [(CONVERGED["compiled"], 1e-7), (Drake(), 2e-5)])
+def test_a_mass_on_cables_breaks_free_as_an_integrator_with_resets_says(engine, atol):
+    friction, starts = ResetIntegrator(reset="range", **BRISTLE), np.array([0.008, -0.005])
+    p_WN = pulled(friction, starts, engine)
     for axis, start, middle in zip("xy", starts, (0.1, 0.0), strict=True):
-        expected = pulled_over_the_ground(start, times)
+        expected = pulled_over_the_ground(start, p_WN.time.values)
         assert np.ptp(expected) > 20.0 * friction.stiction_range
-        p_WN = found.p_WN.sel(node="p", axis=axis).values
-        np.testing.assert_allclose(p_WN - middle, expected, atol=atol)
+        np.testing.assert_allclose(p_WN.sel(axis=axis) - middle, expected, atol=atol)
+
+
+@pytest.mark.parametrize("kind", ["compiled", "drake"])
+def test_errors_are_of_order_2_but_for_resets_within_steps_which_are_of_order_1(kind):
+    """A reset is a jump of the force. Within a step it costs an error of the velocity that is
+    proportional to the step."""
+    weak, starts = {"proportional_stiction": 100.0, "stiffness": 0.0}, np.array([0.008, -0.005])
+
+    def with_step(step: float) -> Compiled | Drake:
+        if kind == "compiled":
+            return Compiled(tolerance=1e6, max_step=step)
+        return Drake(scheme="radau3", accuracy=1e3, max_step=step, look_ahead=step)
+
+    def errors(stiction_range: float) -> list[float]:
+        """Errors (m) with steps of 1.6 and 0.1 ms."""
+        changes = weak | {"stiction_range": stiction_range}
+        friction = ResetIntegrator(reset="range", **BRISTLE | changes)
+        exact = pulled(friction, starts, Compiled(tolerance=1e6, max_step=1e-5))
+        walks = [pulled(friction, starts, with_step(step)) for step in (1.6e-3, 1e-4)]
+        return [float(np.abs(walk - exact).sel(axis="y").max()) for walk in walks]
+
+    coarse, fine = errors(0.05)  # as far as the mass never goes
+    assert coarse < 1e-6 and coarse / fine > 150.0, "256 at order 2"
+    coarse, fine = errors(1e-4)
+    assert coarse < 5e-6 and 4.0 < coarse / fine < 64.0, "16 at order 1"
