@@ -226,9 +226,15 @@ def solved(
         problems = [Problem(task, queue, episodes=episodes) for _ in seeds]
         found = list(threads.map(entry.solve, problems, seeds))
     solutions = [_checked(one, problems[0], entry) for one in found]
-    wall_time, records = (time.perf_counter() - started) / len(seeds), []
+    wall_time = (time.perf_counter() - started) / len(seeds)
+    records: list[Record] = []
     for seed, problem, solution in zip(seeds, problems, solutions, strict=True):
-        record = {"task": task.name, "entry": entry.name, "about": entry.about, "seed": seed}
+        record: Record = {
+            "task": task.name,
+            "entry": entry.name,
+            "about": entry.about,
+            "seed": seed,
+        }
         if not callable(solution):
             record["parameters"] = solution.tolist()
         record["score"] = round(task.scored(solution), DECIMALS)

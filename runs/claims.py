@@ -19,9 +19,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import xarray
+from page import rendered
 from scipy.spatial.transform import Rotation
 from settle import difference_of_means
 
@@ -30,7 +30,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.experiment import evolve
-from tetra_drake.files import check_file, read_json, read_text, write_whole
+from tetra_drake.files import check_file, read_json, write_whole
 from tetra_drake.formatting import TextTable, fixed, listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.laws.curves import travelling_index
@@ -42,7 +42,7 @@ from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
 HERE = Path(__file__).parent
-MOTION, TEXTS = HERE / "thesis/motion.json", HERE / "claims.jinja"
+MOTION = HERE / "thesis/motion.json"
 SCRATCH = Path("out/claims")
 FACTORS = (1, 2, 4)
 """Factors on friction against slip backward."""
@@ -234,7 +234,7 @@ def load_motion(path: Path = MOTION) -> dict[str, Any]:
     record: dict[str, Any] = read_json(path, "record; run `python runs/claims.py`")
     try:
         claims(record)
-    except (jinja2.TemplateError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except (InputError, AttributeError, LookupError, TypeError, ValueError) as error:
         problem = f"cannot be read ({error!r}); run `python runs/claims.py`"
         raise InputError(path, "", problem) from error
     return record
@@ -279,8 +279,7 @@ def claims(record: Mapping[str, Any]) -> TextTable:
     alike, *directional = numbers["friction"]["evolved"]
     gains = listed([ranged(*difference_of_means(alike, inches)) for inches in directional])
     tools = {"over": over, "each": each, "verdict": verdict, "listed": listed, "gains": gains}
-    template = jinja2.Template(read_text(TEXTS, "template"), undefined=jinja2.StrictUndefined)
-    text = template.render(numbers | tools)
+    text = rendered("claims", **numbers, **tools)
     headings = ["claim of the thesis", "criterion", "result, median (range)", "verdict"]
     return TextTable(headings, [line.split(" | ") for line in text.splitlines()], range(4))
 

@@ -22,11 +22,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from page import rendered
 
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import listed, rounded
+from tetra_drake.formatting import rounded
 from tetra_drake.laws.capsules import NoStrutContact
 from tetra_drake.laws.terrain import Nothing
 from tetra_drake.results.result import SimulationResult
@@ -42,29 +43,6 @@ FOLDER = Path(__file__).parents[1] / "tests" / "data" / "corpus"
 MEASURED, KNOWN, PAGE = FOLDER / "measured.json", FOLDER / "known.yaml", FOLDER / "README.md"
 ENGINES = {"compiled": Compiled(), "drake": Drake(), "mujoco": Mujoco()}
 SECONDS = {"simulation.duration": 1.0, "simulation.steady_from": 0.5}
-ABOUT = """# Structures of the literature
-
-Tensegrities, cable nets, domes and cable robots of books, papers and public files: {count}
-structure files, each with its source, in equilibrium on three engines. Tests find the known numbers
-again. Made by `python runs/corpus.py`.
-
-| | least | median | greatest |
-| --- | ---: | ---: | ---: |
-{sizes}
-
-- [`structures.csv`](structures.csv): each structure with its source, its states of self-stress and
-  mechanisms, and the numbers above. *Speed* is the simulated time per wall time of one robot on the
-  compiled engine.
-- [`known.csv`](known.csv): {known} numbers that sources or statics give, beside ours, which differ
-  by {apart} % at most.
-
-Within one second from the equilibrium no node moves by more than {moves}.
-
-To add one: a structure file with the line `# source: ...`, what is known of it in
-[`known.yaml`](known.yaml), and `python runs/corpus.py NAME`.
-
-{names}
-"""
 SIZES = {
     "bodies": "bodies",
     "cables": "cables",
@@ -182,17 +160,16 @@ def tables(rows: dict[str, dict[str, Any]]) -> tuple[pd.DataFrame, pd.DataFrame]
 
 def page(structures: pd.DataFrame, known: pd.DataFrame) -> str:
     """Content of README.md."""
-    sizes = structures[[*SIZES.values()]].quantile([0.0, 0.5, 1.0])
-    rows = [f"| {name} | {' | '.join(f'{x:.4g}' for x in sizes[name])} |" for name in sizes]
     apart = (known["ours"] / known["known"] - 1.0).abs()[known["known"] != 0.0]
     farthest = {one: pd.to_numeric(structures[of], "coerce").max() for one, of in MOVES.items()}
-    return ABOUT.format(
-        count=len(structures),
-        sizes="\n".join(rows),
-        known=len(known),
-        apart=rounded(100.0 * apart.max(), 2),
-        moves=listed([f"{rounded(1e9 * far)} nm ({one})" for one, far in farthest.items()]),
-        names=" · ".join(f"[{name}]({name}.yaml)" for name in structures["structure"]),
+    return rendered(
+        "corpus.md",
+        structures=structures,
+        known=known,
+        sizes=structures[[*SIZES.values()]].quantile([0.0, 0.5, 1.0]),
+        apart=apart.max(),
+        moves=[f"{rounded(1e9 * far)} nm ({one})" for one, far in farthest.items()],
+        names=[f"[{name}]({name}.yaml)" for name in structures["structure"]],
     )
 
 

@@ -58,20 +58,11 @@ TIGHTENED_FROM = 1.5e3
 """Self-stress (N) of the simplex from which the lengthening of one tube is counted."""
 SAG = 0.7e-3
 """Sag (m) of an unloaded tube under its weight."""
-ELEMENTS = {
-    "bottom n1 n2": "CB1",
-    "bottom n0 n1": "CB2",
-    "bottom n0 n2": "CB3",
-    "top n4 n5": "CT1",
-    "top n3 n4": "CT2",
-    "top n3 n5": "CT3",
-    "vertical n2 n5": "CV3",
-    "vertical n1 n4": "CV2",
-    "vertical n0 n3": "CV1",
-}
-"""Names of the simplex's cables in its measurements."""
-CASES = parse_yaml(read_text(HERE / "cases.yaml", "cases"), "cases.yaml")
-"""The cases by the names of their files in KEPT."""
+_GIVEN = parse_yaml(read_text(HERE / "cases.yaml", "cases"), "cases.yaml")
+CASES, ELEMENTS = _GIVEN["cases"], _GIVEN["elements"]
+"""The cases by the names of their files in KEPT, and the simplex's cables by their names there."""
+KINDS = {word: kind for kind, words in _GIVEN["kinds"].items() for word in words}
+"""Kind and unit of a quantity as a text, by its first word without number."""
 FACTS = read_json(HERE / "blind_measured.json", "measured values")
 LOADING = {1.5: "simplex_loading.csv", 8.5: "simplex_loading_8.5kN.csv"}
 """Files of what was measured under load, by self-stress (kN)."""
@@ -88,17 +79,6 @@ SPINE_AXIS = np.array([0.0, 0.0, 0.1785])
 LAW = ("stiffness", "tension")
 TWIST = 15.0
 """Twist (degrees) of Laika's centre vertebra at which the loads of its feet are computed."""
-
-KINDS = {
-    **dict.fromkeys(("H", "height"), ("shape", "mm")),
-    **dict.fromkeys(("CB", "CT", "CV", "S"), ("force", "kN")),
-    "frequency": ("frequency", "Hz"),
-    "rise": ("motion", "m"),
-    "lift": ("motion", "degrees"),
-    **dict.fromkeys(("x", "y"), ("motion", "mm")),
-    "angle": ("motion", "degrees"),
-}
-"""Kind and unit of a quantity, by its first word without number."""
 
 
 class Unknown(NamedTuple):
@@ -194,7 +174,8 @@ def committed() -> pandas.DataFrame:
 
 def kind_and_unit(quantity: str) -> tuple[str, str]:
     """Kind and unit of a quantity."""
-    return KINDS[quantity.split()[0].rstrip("0123456789")]
+    kind, unit = KINDS[quantity.split()[0].rstrip("0123456789")].split(" in ")
+    return kind, unit
 
 
 def _most(shares: pandas.Series) -> str:

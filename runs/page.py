@@ -43,6 +43,11 @@ def over(values: Sequence[float], digits: int = 2) -> str:
     return f"{middle} ({low} to {high})"
 
 
+def significant(value: float, digits: int = 3) -> str:
+    """A number with this many significant digits, without zeros at its end."""
+    return f"{value:.{digits}g}"
+
+
 def spanned(values: Sequence[float]) -> str:
     """A number and its range, (number, low, high), as text with three significant digits."""
     return ranged(*values)
@@ -59,12 +64,12 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    functions = (fixed, rounded, listed, percent, median, over, spanned)
+    functions = (fixed, rounded, listed, percent, median, over, significant, spanned)
     environment.filters.update({each.__name__: each for each in functions})
     return environment
 
 
-def rendered(name: str, **numbers: object) -> str:
+def rendered(name: str, /, **numbers: object) -> str:
     """The page from the template of a name and numbers. Raises InputError if it has a number that
     is not given."""
     try:

@@ -22,14 +22,14 @@ def made(run: Run, trial: int) -> pandas.DataFrame:
     return run.evaluations[run.evaluations["trial"] == trial].set_index("index")
 
 
-def asked(run: Run, trial: int) -> list[Vector]:
-    """The parameter vectors for which the search of a trial asked, in the order of its
-    evaluations."""
+def asked(run: Run, trial: int, most: int | None = None) -> list[Vector]:
+    """The parameter vectors for which the search of a trial asked, in the order of its evaluations;
+    at most so many."""
     scenario = run.scenario
     seed = np.random.SeedSequence(run.manifest.seed).spawn(scenario.evolution.trials)[trial]
     make, space = optimizer_of(scenario.optimizer), ParameterSpace.of(scenario)
     optimizer = make(space, scenario.evolution, np.random.default_rng(seed))
-    told = made(run, trial)["fitness"].fillna(-np.inf).tolist()
+    told = made(run, trial)["fitness"].fillna(-np.inf).tolist()[:most]
     vectors: list[Vector] = []
     while len(vectors) < len(told):
         first = len(vectors)

@@ -10,6 +10,7 @@ continues. Then planning_page.py writes the page README.md and its pictures from
 from __future__ import annotations
 
 import argparse
+import contextlib
 import functools
 import math
 import os
@@ -40,7 +41,6 @@ from records import append
 from scipy.ndimage import map_coordinates
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.experiment import evolve
 from tetra_drake.lab.planner import Planner
@@ -302,25 +302,35 @@ def all_episodes() -> list[Episode]:
     return [episode for group in each for episode in group]
 
 
+class Over(Exception):
+    """The end of an episode, from within its controller."""
+
+
 def run_episode(episode: Episode) -> tuple[Record, SimulationResult]:
     """Runs an episode. Returns its record, and the result of the same actions up to its end."""
     scenario, model = episode.scenarios()
     task, settings = episode.make_task(), episode.settings
     command = episode.make_command() if episode.make_command else None
-    planner = Planner(model, task, **settings, command=command)
-    plant = Simulation(scenario, control_period=settings["control_period"])
-    actions, cpu, is_done, load = [], [], False, os.getloadavg()[0]
-    while not (is_done or plant.ended[0]):
-        readings = plant.state.rows(0)
+    planner, period = Planner(model, task, **settings, command=command), settings["control_period"]
+    actions: list[np.ndarray] = []
+    cpu, is_done, load = [], False, os.getloadavg()[0]
+
+    def act(now: float, readings: Readings) -> np.ndarray:
+        nonlocal is_done
+        is_done = len(actions) > 0 and task.is_done(readings)
+        if is_done or now > episode.most - 0.5 * period:
+            raise Over
         begun, decided = time.process_time(), planner.decisions
-        actions.append(planner(float(readings.time), readings))
+        actions.append(planner(now, readings))
         if planner.decisions > decided:
             cpu.append(time.process_time() - begun)
-        readings = plant.step(actions[-1]).rows(0)
-        is_done = task.is_done(readings)
-    if failure := plant.failures[0]:
-        raise failure
-    result = play(scenario, actions, period=settings["control_period"])
+        return actions[-1]
+
+    # One period more, at whose beginning it is over.
+    longer = scenario.with_numbers({"simulation.duration": episode.most + period})
+    with contextlib.suppress(Over):
+        simulate(longer, controller=act, control_period=period)
+    result = play(scenario, actions, period=period)
     record = recorded(episode, task, result, cpu, is_done=is_done)
     wall = [round(each, 3) for each in planner.wall_times]
     record |= {"wall": wall, "load": round(load, 1)}
@@ -333,10 +343,8 @@ def run_episode(episode: Episode) -> tuple[Record, SimulationResult]:
 def play(scenario: Scenario, actions: Sequence[np.ndarray], *, period: float) -> SimulationResult:
     """Result of a robot after actions, each for a period (s)."""
     short = scenario.with_changes({"simulation.duration": f"{period * len(actions):.6g} s"})
-    plant = Simulation(short, control_period=period, record=True)
-    for each in actions:
-        plant.step(each)
-    return plant.result()
+    again = lambda now, _: actions[round(now / period)]  # noqa: E731
+    return simulate(short, controller=again, control_period=period, record=True)
 
 
 def recorded(

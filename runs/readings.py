@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -24,34 +24,18 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.experiment import evolve
-from tetra_drake.files import check_file, read_json, write_whole
+from tetra_drake.files import check_file, read_json, read_text, write_whole
 from tetra_drake.formatting import listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
+from tetra_drake.scenario.yaml_text import parse_yaml
 from tetra_drake.study.statistics import interval, interval_of_resamples, resampled
 
 HERE = Path(__file__).parent
 RECORD = HERE / "thesis" / "readings.json"
 SCRATCH = Path("out/readings")
-
-COARSE = "!Compiled {tolerance: 1e-2 m/s, max_step: 100 ms}"
-FIXED = "!Compiled {tolerance: 1000 m/s}"
-"""An engine that accepts every step of max_step."""
-
-_ONE_LBF = {"cpg.gain": "1 lbf"}
-_NEVER = {"friction.reset": "never"}
-_SECOND_SAMPLE = {"simulation.steady_from": "0 s"}
-_OTHER_TAU = {"optimizer.tau_mutation": "listing"}
-_STIFF = {"friction.stiffness": "0.3 lbf/in", "friction.proportional_stiction": 0.0}
-_AT_ONCE = {"cpg.start_up": "0 s"}
-_PER_LOAD = {"friction.load": "1 lbf"}
-_LISTED = {
-    "cpg.signals": "listing",
-    "engine": "!Compiled {tolerance: 1e-3 m/s, max_step: 10 ms}",
-}
-
 
 Record: TypeAlias = dict[str, list[dict[str, float]]]
 """Numbers of the trials by reading."""
@@ -72,68 +56,25 @@ class Reading:
     """Settings of SteadyState that end them."""
 
 
-AS_WRITTEN = {
-    "thesis": Reading(
-        "as written: the deflection becomes 0 where a node breaks free", run="thesis"
-    ),
-    "listing": Reading("as the code ran: the listing's signals, τ_A and dx₁", run="thesis-listing"),
-    "listed": Reading("the listing's signals", _LISTED),
-    "gain-1": Reading("signals of gain 1, as in the listing", _ONE_LBF),
-    "load": Reading("friction times the normal force in lbf", _PER_LOAD),
-    "stop-never": Reading("2000 iterations in every trial", {"optimizer.stop_rise": 0.0}),
-    "early": Reading(
-        "the stop counts from iteration 100", trials_of="stop-never", stop={"stop_after": 100}
-    ),
-    "steep": Reading(
-        "the stop needs a rise of 0.3", trials_of="stop-never", stop={"stop_rise": 0.3}
-    ),
-    "olsson": Reading("never reset, σ₀ x without the velocity, as Olsson", _NEVER | _STIFF),
+def load_readings(file: Path) -> dict[str, dict[str, Reading]]:
+    """The readings of a file by part and name."""
+    content = parse_yaml(read_text(file, "readings"), file)
+    return {
+        part: {name: Reading(**given) for name, given in readings.items()}
+        for part, readings in content.items()
+    }
+
+
+_GIVEN = load_readings(HERE / "readings.yaml")
+_SLIPPING = {
+    f"slip-{name}": replace(reading, about=f"slips; {reading.about}", base="thesis-reversal")
+    for name, reading in _GIVEN["slips"].items()
 }
-"""The scenario `thesis`, and other readings of what does not concern slip."""
-
-_SLIPPING: Mapping[str, tuple[str, Mapping[str, Any]]] = {
-    "never": ("never reset, as Eq. 3 and 4 print", _NEVER),
-    "no-product": ("σ₀ x without the velocity in Eq. 5", _STIFF),
-    "load": ("friction times the normal force in lbf", _PER_LOAD),
-    "both": ("a node breaks free along x and y at once", {"friction.breaks_free": "both"}),
-    "gain-1": ("signals of gain 1, as in the listing", _ONE_LBF),
-    "gain-1.5": ("signals of gain 1.5", {"cpg.gain": "1.5 lbf"}),
-    "at-once": ("signals from the start", _AT_ONCE),
-    "second-sample": ("dx₁ from the second sample, as in the listing", _SECOND_SAMPLE),
-    "tau": ("mutation never reaches τ_A, as in the listing", _OTHER_TAU),
-    "crossover": ("crossover 80 %", {"optimizer.crossover_probability": 0.8}),
-    "coarse": ("coarse variable steps", {"engine": COARSE}),
-    "fixed": ("fixed steps of 3 ms", {"engine": FIXED}),
-    "stop-never": ("2000 iterations in every trial", {"optimizer.stop_rise": 0.0}),
-    "listing": ("gain 1, τ_A and dx₁ as in the listing", _ONE_LBF | _SECOND_SAMPLE | _OTHER_TAU),
-    "never-gain-1": ("never reset, gain 1", _NEVER | _ONE_LBF),
-}
-
-FORMER = {
-    "reversal": Reading("a node slips until its velocity changes sign", run="thesis-reversal")
-} | {
-    f"slip-{name}": Reading(f"slips; {about}", changes, "thesis-reversal")
-    for name, (about, changes) in _SLIPPING.items()
-}
-"""Readings under which nodes slip: the scenario `thesis-reversal` and its variants."""
-
-READINGS = AS_WRITTEN | FORMER
-
-_THREE = {"evolution.trials": 3}
-
-FUTURE = {
-    "constant-tau": Reading(
-        "τ_A = 0.2 s",
-        _THREE | {"gait_bounds.tau_a_min": "0.2 s", "gait_bounds.tau_a_max": "0.2 s"},
-    ),
-    "free-tau-b": Reading("τ_B by itself", _THREE | {"gait_bounds.independent_tau_b": True}),
-    "smooth": Reading(
-        "fitness with a cost of signal rates", _THREE | {"objective.signal_rate": "-5 s/lbf"}
-    ),
-}
-"""Variations that chapter 4 of the thesis proposes, three trials each."""
-
-ALL = READINGS | FUTURE
+_REVERSAL = Reading("a node slips until its velocity changes sign", run="thesis-reversal")
+READINGS = _GIVEN["as-written"] | {"reversal": _REVERSAL} | _SLIPPING
+ALL = READINGS | _GIVEN["future"]
+COARSE, FIXED = (_SLIPPING[f"slip-{name}"].changes["engine"] for name in ("coarse", "fixed"))
+"""Engines of two readings."""
 
 
 def run_of(name: str) -> Run:

@@ -3,9 +3,9 @@
     python runs/record.py [--so-far] [NAME ...]
 
 Each experiment is evolved and analysed in a folder of out/runs, then thinned into a folder here. A
-page and a picture (made by Chromium) show its best gait. Experiments in README.md are filmed, too.
-After an interruption the script continues; finished experiments are skipped. All pages share the
-viewer meshcat.js of one version of Drake. times.json has the time of each experiment.
+picture (made by Chromium from a replay) and a gait diagram show its best gait. Experiments in
+README.md are filmed, too. After an interruption the script continues; finished experiments are
+skipped. times.json has the time of each experiment.
 
 With --so-far, the folders here get what there is of experiments that are being evolved. Such a run
 is whole, not thinned: where out/runs has none, the script goes on from it.
@@ -38,25 +38,22 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import write_whole
+from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import duration, listed
 from tetra_drake.lab.elites.elites import judge_elites
-from tetra_drake.lab.prototype.export import export
 from tetra_drake.machine import available_cores
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.optimizer_kinds import CmaEs, OptimizerKind, QualityDiversity
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.yaml_text import parse_yaml
 
 HERE = Path(__file__).parent
 SCRATCH = Path("out/runs")
-VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
+PICTURE, FILM = "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
-TIMES, EXPORTED = "times.json", "lab"
+TIMES = "times.json"
 SO_FAR, EVOLUTION = "--so-far", "evolution"
-RATE = 50.0
-"""Sampling rate (Hz) of exported commands."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +65,10 @@ class Experiment:
     """Name of a shipped scenario."""
     changes: Mapping[str, Any]
     """Changes of the scenario by key, without the name."""
+    initial: bool = False
+    """True if its record keeps the genomes of all initial populations, which a page reads."""
     film: bool = False
     """True if its best gait is filmed, for README.md."""
-    exported: bool = False
-    """True if its best gait is exported for a prototype, into the folder EXPORTED."""
     engine: str = "compiled"
 
     def scenario(self, name: str) -> Scenario:
@@ -85,149 +82,18 @@ _STEP = {"engine.max_step": "3 ms"}
 """The longest step of runs on the compiled engine, also where damping is light."""
 
 
-_SOUND = {"require": {"clearance": "0.125 in", "tension": 0.0}}
-"""Requirements: struts do not touch, and cables need not push."""
-
-_WELL_APART = {"require": {"clearance": "0.25 in", "tension": 0.0}}
-"""Requirements: the distance of struts is at least two diameters, and cables need not push."""
-
-_EFFORT = {"require": {"clearance": "0.125 in", "tension": 0.0, "mean_actuator_power": "80 mW"}}
-"""Requirements of _SOUND, and a limit for the effort of a gait."""
-
-
-def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, Any]:
-    """Changes of a scenario for an experiment with this optimiser."""
-    sizes = {"evolution.trials": trials, "evolution.evaluations": evaluations}
-    return {"optimizer": optimizer, **sizes}
+def load_experiments(file: Path) -> dict[str, Experiment]:
+    """The experiments of a file by name of the folder, in the order of the gallery."""
+    content, experiments = parse_yaml(read_text(file, "experiments"), file), {}
+    for name, given in content["experiments"].items():
+        own = given.pop("changes", {})
+        of_groups = [content["groups"][group] for group in given.pop("with", [])]
+        changes = dict(item for each in (*of_groups, own) for item in each.items())
+        experiments[name] = Experiment(changes=changes, **given)
+    return experiments
 
 
-_SLIPPING = {
-    "friction.reset": "reversal",
-    "cpg.signals": "listing",
-    "engine.tolerance": "0.1 mm/s",
-}
-"""The reading of the thesis's friction by which nodes slip."""
-
-_SHORT, _SETTLED = _by(CmaEs(), 3, 2000), _by(CmaEs(), 10, 2000)
-_APART = {"require": {"clearance": "8 mm", "tension": 0.0}}
-"""Requirements: struts do not touch, 8 mm being the thickest's diameter, and cables never push."""
-
-_FORMER = {"robot.anchor_stiffness": "100 kN/m"}
-"""A former default in the records of structures, which have no anchors."""
-
-_STRUCTURE = _by(CmaEs(), 3, 1500) | {"simulation.duration": "15 s"} | _APART | _FORMER
-
-_BODY = {
-    "evolve": {
-        "robot.cables.bottom.stiffness": ["50 N/m", "200 N/m"],
-        "robot.cables.top.stiffness": ["50 N/m", "200 N/m"],
-        "robot.cables.side.stiffness": ["50 N/m", "200 N/m"],
-        "robot.cables.side.free_length": ["7 cm", "13 cm"],
-        "robot.nodes.n3[2], robot.nodes.n4[2], robot.nodes.n5[2]": ["12 cm", "20 cm"],
-    }
-}
-"""Numbers of a prism that evolve: cables, and the height of the upper nodes, which gives the
-lengths of the struts."""
-
-_MOTORS_MAP = QualityDiversity(
-    measures={"travelling_index": [0.0, 1.0], "lifted": [0.2, 0.7]}, cells=[15, 15]
-)
-
-EXPERIMENTS = {
-    "rolling": Experiment(
-        "a rover of six struts rolls by a feedback policy, in 10 s",
-        "rolling",
-        {"simulation.steady_from": "2 s"} | _FORMER,
-        film=True,
-    ),
-    "thesis": Experiment("the thesis's experiment, ten trials", "thesis", {}),
-    "thesis-listing": Experiment(
-        "the same as the thesis's code ran: the listing's signals, mutation and distance",
-        "thesis-listing",
-        {},
-    ),
-    "thesis-reversal": Experiment(
-        "the same where nodes that break free slip until their velocity changes sign",
-        "thesis-reversal",
-        {},
-    ),
-    "thesis-drake": Experiment(
-        "the same evolved on the Drake diagram itself, three trials that are not finished",
-        "thesis",
-        {"evolution.trials": 3},
-        engine="drake",
-    ),
-    "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
-    "coulomb": Experiment("the same under friction that grows with the load", "coulomb", {}),
-    "incline": Experiment("up an incline of 5°", "incline", _SHORT),
-    "steps": Experiment("up four steps of 0.25 in", "steps", _SHORT),
-    "rough": Experiment(
-        "over rough ground, ten trials", "rough", _SETTLED | _WELL_APART | {"cpg.signals": "live"}
-    ),
-    "rough-feedback": Experiment(
-        "the same with feedback to the oscillators", "feedback", _SETTLED | _WELL_APART
-    ),
-    "undulation": Experiment(
-        "an oscillator for each bottom cable, so that the robot can undulate, ten trials",
-        "undulation",
-        _SETTLED | _EFFORT,
-    ),
-    "undulation-four": Experiment(
-        "the same with an oscillator for each pair of cables",
-        "undulation",
-        _SETTLED | _EFFORT | {"robot.actuation": [["outer bottom_left", "outer bottom_right"]]},
-    ),
-    "turning": Experiment("turning on the spot, in 30 s", "turning", _SHORT | _SOUND, film=True),
-    "robust": Experiment("far on eight disturbed robots", "robust", _by(CmaEs(), 3, 1000)),
-    "efficient": Experiment("with little work", "efficient", _SHORT),
-    "twelve": Experiment(
-        "twelve tetrahedra",
-        "coulomb",
-        _by(CmaEs(), 2, 1000) | {"robot.tetrahedra": 12},
-        film=True,
-    ),
-    "champion": Experiment(
-        "a long search for the thesis's robot, where friction grows with the load",
-        "coulomb",
-        _by(CmaEs(population=16, sample=100, starts=12), 3, 16000),
-        film=True,
-    ),
-    "map": Experiment(
-        "gaits that differ, the fittest of each kind, where nodes slip",
-        "thesis",
-        _by(QualityDiversity(), 1, 30000) | _SLIPPING,
-    ),
-    "prism": Experiment("a prism of three struts", "prism", _STRUCTURE, film=True),
-    "co-evolution": Experiment(
-        "a prism whose body evolves with its gait, in 8 s, ten trials",
-        "prism",
-        _by(CmaEs(), 10, 600) | _APART | _BODY | _FORMER,
-    ),
-    "co-evolution-gait": Experiment(
-        "the same prism as it is, its gait alone, in 8 s, ten trials",
-        "prism",
-        _by(CmaEs(), 10, 600) | _APART | _FORMER,
-    ),
-    "six-bar": Experiment("a six-bar tensegrity", "six_bar", _STRUCTURE, film=True),
-    "mast": Experiment("a mast of four vertebrae, lying", "mast", _STRUCTURE, film=True),
-    "pair": Experiment(
-        "two nested tetrahedra, ten trials", "pair", _STRUCTURE | {"evolution.trials": 10}
-    ),
-    "winch": Experiment("stiff cables on winches", "winch", _by(CmaEs(), 3, 1500), exported=True),
-    "motors": Experiment(
-        "the thesis's robot carries motors",
-        "motors",
-        _by(CmaEs(), 3, 1500),
-        film=True,
-        exported=True,
-    ),
-    "motors-map": Experiment(
-        "gaits of the robot with motors that differ, the fittest of each kind",
-        "motors",
-        _by(_MOTORS_MAP, 1, 12000),
-    ),
-}
-"""Experiments by name of the folder, in the order of the gallery."""
+EXPERIMENTS = load_experiments(HERE / "experiments.yaml")
 
 
 def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> None:
@@ -279,20 +145,17 @@ def publish(
             judge_elites(made)
             analyse(made, workers=available_cores())
     with timed(name, "pages", out):
-        make_folder(made, shown, whole=whole)
-        show(shown, viewer=out / VIEWER, film=experiment.film)
-        if experiment.exported:
-            run = load_run(made)
-            export(run.scenario, run.best_gait(), rate=RATE, out=shown / EXPORTED)
+        make_folder(made, shown, initial=experiment.initial, whole=whole)
+        show(shown, film=experiment.film)
     shutil.copy(analysis, shown / ANALYSIS)
 
 
-def make_folder(made: Path, shown: Path, *, whole: bool = False) -> None:
-    """Thins a run into the folder `shown`, in place of its old trials and exported files; or copies
+def make_folder(made: Path, shown: Path, *, initial: bool = False, whole: bool = False) -> None:
+    """Thins a run into the folder `shown`, in place of its old trials; or copies
     its record, if it is to be `whole`."""
-    for old in (*shown.glob("trial_*"), *shown.glob(EXPORTED)):
+    for old in shown.glob("trial_*"):
         shutil.rmtree(old)
-    thin(made, shown, whole=whole)
+    thin(made, shown, initial=initial, whole=whole)
 
 
 def load_times(out: Path) -> dict[str, Any]:
@@ -324,14 +187,16 @@ def timed(name: str, stage: str, out: Path) -> Iterator[None]:
         print(f"{name}, {stage}: {duration(spent['wall_s'])}", flush=True)
 
 
-def show(directory: Path, *, viewer: Path, film: bool) -> None:
-    """Simulates a run's best gait on the compiled engine. Writes the page, the picture, the gait
-    diagram and, if the experiment is filmed, the film."""
+def show(directory: Path, *, film: bool) -> None:
+    """Simulates a run's best gait on the compiled engine. Writes the picture, the gait diagram and,
+    if the experiment is filmed, the film."""
     run = load_run(directory)
     result = simulate(run.scenario.on_engine("compiled"), run.best_gait(), record=True)
-    result.save_replay(directory / REPLAY, viewer=viewer)
     films = [directory / FILM] if film else []
-    take_pictures(directory / REPLAY, *films, directory / PICTURE)
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / REPLAY
+        result.save_replay(page)
+        take_pictures(page, *films, directory / PICTURE)
     save_figure(gait_diagram(result), directory, DIAGRAM, kinds=["svg"])
 
 

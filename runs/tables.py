@@ -1,4 +1,4 @@
-"""Tables of README.md, of the README in this folder and of recorded runs; the page index.html.
+"""Tables of README.md, of the README in this folder and of recorded runs.
 
     python runs/tables.py [FILE ...]
 
@@ -6,8 +6,6 @@ Each table is in a Markdown file between two lines:
 
     <!-- table NAME: made by runs/tables.py -->
     <!-- end -->
-
-index.html shows all runs. Each picture opens the replay of a run, on any host of static files.
 """
 
 from __future__ import annotations
@@ -33,9 +31,8 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import TextTable, fixed, rounded, uncertain
+from tetra_drake.formatting import fixed, rounded, uncertain
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS, looks_for_turns
 from tetra_drake.scenario.scenario import Scenario
@@ -44,7 +41,7 @@ from tetra_drake.settings.units import INCH, Units
 HERE = Path(__file__).parent
 FRONT = HERE.parent
 """Folder of the project's README."""
-README, GALLERY = "README.md", "index.html"
+README = "README.md"
 
 APART = 0.3 * INCH
 """Largest difference (m) of distances on two engines that a page does not mention."""
@@ -53,19 +50,6 @@ HEIGHT = 96
 """Height of pictures in the gallery's table, in pixels."""
 
 ENGINES = ("compiled", "diagram", "MuJoCo")
-
-MEASURED = {
-    "simplex": "a simplex of 2 m: heights under load",
-    "spine": "a planar spine: poses",
-    "jumper": "a jumper of six struts: height of jumps",
-}
-"""Figures of the folder `measured`, with what they show."""
-
-PLANNED = {
-    "goals": "twenty goals, on three robots",
-    "courses": "courses with pillars",
-}
-"""Figures of the folder `planning`, with what they show."""
 
 FAR = 5.0
 """Distance (in) from which a gait walks; of less, a difference in percent says little."""
@@ -195,8 +179,8 @@ def gallery_table(runs: Runs) -> str:
         name: sum(stage["cores_s"] for stage in stages.values()) / (2 * 60)
         for name, stages in load_times(HERE).items()
     }
-    files = {"README": README, "REPLAY": REPLAY, "PICTURE": PICTURE, "shown": shown}
-    return rendered("gallery.md", bests=best_of_all(runs), minutes=minutes, **files)
+    bests, files = best_of_all(runs), {"README": README, "PICTURE": PICTURE, "shown": shown}
+    return rendered("gallery.md", bests=bests, minutes=minutes, **files)
 
 
 def differences(runs: Runs) -> pandas.DataFrame:
@@ -241,12 +225,6 @@ def results_table(runs: Runs) -> str:
     return rendered("results.md", names=[*names], best=best, trials=trials)
 
 
-def gallery_page(runs: Runs) -> str:
-    """The page index.html."""
-    figures = {"measured": MEASURED, "planned": PLANNED}
-    return rendered(GALLERY, bests=best_of_all(runs), replay=REPLAY, picture=PICTURE, **figures)
-
-
 def trials_table(name: str, runs: Runs) -> str:
     """Table of the fittest gait of each trial of a run, on all engines and on disturbed robots.
     Below it, the trials with different distances on the engines."""
@@ -270,14 +248,8 @@ def trials_table(name: str, runs: Runs) -> str:
 
 def partings_table(name: str, other: str) -> str:
     """Table of where the trials of a run part from the same trials of another run."""
-    found, rows = partings(load_run(HERE / name), load_run(HERE / other)), []
-    for trial, row in found.iterrows():
-        counts = [f"{row[key]:.0f}" for key in ("evaluations", "alike")]
-        apart = [fixed(row[key], 4) for key in ("apart", "farthest")]
-        best = [fixed(row[key]) for key in ("first_best", "second_best")]
-        rows.append([f"{trial}", *counts, *apart, *best])
-    headings = ["trial", "gaits", "the same gaits", "apart, median (in)", "largest (in)"]
-    return TextTable([*headings, f"`{name}` (in)", f"`{other}` (in)"], rows).markdown()
+    found = partings(load_run(HERE / name), load_run(HERE / other))
+    return rendered("partings.md", rows=found, name=name, other=other)
 
 
 def pages(runs: Runs) -> list[Path]:
@@ -319,13 +291,10 @@ def filled(text: str, make_table: Callable[[str], str]) -> str:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Runs the script: writes the tables of the given Markdown files, or of all pages and
-    index.html."""
+    """Runs the script: writes the tables of the given Markdown files, or of all pages."""
     runs = load_all()
     for page in [Path(name).resolve() for name in arguments] or pages(runs):
         write_whole(page, made_again(page, runs))
-    if not arguments:
-        write_whole(HERE / GALLERY, gallery_page(runs))
 
 
 if __name__ == "__main__":

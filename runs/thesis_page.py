@@ -3,7 +3,7 @@
     python runs/thesis_page.py
 
 Numbers are from the recorded runs and from short simulations. The text of the page is the template
-thesis.md.jinja.
+templates/thesis.md.jinja.
 """
 
 from __future__ import annotations
@@ -14,23 +14,22 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import pandas
 import readings
 import xarray
 from analyse import load_analysis
 from claims import claims, load_motion
+from page import rendered
 from record import load_times
 from settle import difference_of_means, numbers
 from tables import aspect, best_gait
 from thesis_figures import EVOLVED, mean_fitness, save_figures
-from thinning import last_population
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.files import read_json, read_text, write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.formatting import fixed, ranged, rounded
 from tetra_drake.robot.measures import dominant_frequency
 from tetra_drake.robot.robot import Robot
@@ -42,7 +41,7 @@ from tetra_drake.settings.units import INCH, POUND_FORCE, plainest
 HERE = Path(__file__).parent
 PAGE, FIGURES = HERE / "thesis/THESIS.md", HERE / "thesis/redrawn"
 NUMBERS = HERE / "thesis/simulated.json"
-TEMPLATE, SINES = HERE / "thesis.md.jinja", HERE / "thesis/sine.json"
+SINES = HERE / "thesis/sine.json"
 FORMER = HERE / "thesis-reversal"
 
 sys.path.append(str(HERE.parent / "diagrams"))
@@ -75,10 +74,9 @@ def over_trials(values: pandas.Series, digits: int = 2) -> str:
 
 
 def two_best(run: Run, trial: int) -> pandas.Series:
-    """Absolute differences of fitness and parameters of the two best gaits of a trial's last
-    population, as in Table 8. Gaits with the same parameters count once."""
-    members = last_population(run, trial).filter(regex="^(fitness$|weight |tau_)")
-    best = members.drop_duplicates(members.columns[1:]).nlargest(2, "fitness")
+    """Absolute differences of fitness and parameters of the two best gaits of a trial, as in
+    Table 8; they are in its last population. Gaits with the same parameters count once."""
+    best = run.best(2).query("trial == @trial").filter(regex="^(fitness$|weight |tau_)")
     return best.diff().iloc[1].abs()
 
 
@@ -238,12 +236,10 @@ def simulated_numbers(run: Run) -> dict[str, Any]:
 
 def page(run: Run, simulated: Mapping[str, Any]) -> str:
     """Text of the page, with simulated_numbers()."""
-    template = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True).from_string(
-        read_text(TEMPLATE, "template")
-    )
     sines = read_json(SINES, "record; run `python runs/sine.py`")
     tables = readings.tables_of(readings.load_record(readings.RECORD))
-    return template.render(
+    return rendered(
+        "thesis.md",
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
         former=trials_numbers(load_run(FORMER)),
@@ -267,7 +263,7 @@ def main() -> None:
     run = load_run(HERE / "thesis")
     save_figures(run, FIGURES)
     write_whole(NUMBERS, json.dumps(simulated_numbers(load_run(FORMER)), indent=1) + "\n")
-    write_whole(PAGE, page(run, read_json(NUMBERS, "numbers")) + "\n")
+    write_whole(PAGE, page(run, read_json(NUMBERS, "numbers")))
 
 
 if __name__ == "__main__":

@@ -2,12 +2,14 @@
 
     manifest.json, scenario.yaml    unchanged, but the first has `thinned`
     trial_00/best_gait.json, trial_00/best.yaml    unchanged
-    trial_00/evaluations.jsonl.xz      genomes and all digits of the kept gaits; for other gaits few
-                                       digits of the metrics that select gaits
+    trial_00/evaluations.jsonl.xz      genomes of the kept gaits, all digits of the metrics that
+                                       select gaits, and six of the others; for other gaits few
+                                       digits of the former
     trial_00/iterations.jsonl.xz, trial_00/reevaluations.jsonl.xz (without genomes), elites.jsonl.xz
 
-Kept gaits are: the first of each trial, each gait that was the best so far, the last population,
-the best of each trial, gaits evaluated again on the diagram, and gaits of a map.
+Kept gaits are: the best of each trial, gaits evaluated again on the diagram, gaits of a map, and of
+trial 0 the initial population and each gait that was the best so far; with `initial` the initial
+populations of all trials. The fitness of each gait that was the best so far keeps its digits.
 """
 
 from __future__ import annotations
@@ -40,8 +42,9 @@ from tetra_drake.lab.elites.elites import elites
 from tetra_drake.scenario.load import SCENARIO
 from tetra_drake.scenario.scenario import Scenario
 
-_DIGITS, _WALL_TIME_DIGITS = 3, 2
-"""Significant digits of the numbers of an evaluation without genome, and of all wall times."""
+_DIGITS, _KEPT_DIGITS, _WALL_TIME_DIGITS = 3, 6, 2
+"""Significant digits of the numbers of an evaluation without genome, of a kept gait's metrics that
+select no gaits, and of all wall times."""
 
 _DECIMALS = 9
 """Decimals of metrics in SI. Further digits are rounding errors, such as the drift of a symmetric
@@ -51,19 +54,22 @@ _DOWN = decimal.Context(prec=6, rounding=decimal.ROUND_FLOOR)
 """Digits of the fitness of an evaluation without genome. With fewer, it could become a new best."""
 
 
-def thin(source: Path, out: Path, *, whole: bool = False) -> None:
+def thin(source: Path, out: Path, *, initial: bool = False, whole: bool = False) -> None:
     """Writes a thinned copy of a run to the folder `out`; or with `whole` a compressed copy that
     lacks nothing of finished iterations, from which the run can go on. Raises InputError if a file
     cannot be read or written."""
     run = load_run(source)
     manifest = json.loads((source / MANIFEST).read_text(encoding="utf-8")) | {"thinned": not whole}
-    matter = {(int(trial), int(index)) for trial, index in _that_matter(run)}
-    metrics = _that_choose(run.scenario)
+    matter = _that_matter(run, initial)
+    rises, metrics = _keys(_rises(run.evaluations)), _that_choose(run.scenario)
     for trial in range(run.scenario.evolution.trials):
         iterations = _entries(run, ITERATIONS, trial)  # read first: a run may grow meanwhile
         thinned = []
         for entry in _entries(run, EVALUATIONS, trial):
-            kept = entry if (trial, entry["index"]) in matter or whole else _thinned(entry, metrics)
+            key = trial, entry["index"]
+            reduced = _kept(entry, metrics) if key in matter else _thinned(entry, metrics)
+            reduced |= {"fitness": entry["fitness"]} if key in rises else {}
+            kept = entry if whole else reduced
             wall_time = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
             thinned.append(kept | {"wall_time_s": wall_time})
         again = [e | {"genome": None} for e in _entries(run, REEVALUATIONS, trial)]
@@ -86,29 +92,38 @@ def _entries(run: Run, name: str, trial: int | None = None) -> list[dict[str, An
     return [line.content() for line in run.file(name, trial).read()]
 
 
-def _that_matter(run: Run) -> set[tuple[Any, Any]]:
+def _rises(evaluations: pandas.DataFrame) -> pandas.DataFrame:
+    """The evaluations of gaits that were the best of their trial so far."""
+    best_so_far = evaluations.groupby("trial")["fitness"].cummax()
+    return evaluations[evaluations["fitness"] == best_so_far]
+
+
+def _keys(table: pandas.DataFrame) -> set[tuple[int, int]]:
+    """Trial and index of evaluations."""
+    return {(int(trial), int(index)) for trial, index in table[["trial", "index"]].to_numpy()}
+
+
+def _that_matter(run: Run, initial: bool) -> set[tuple[int, int]]:
     """Trial and index of the kept gaits; their evaluations keep their genomes."""
-    table = run.evaluations
-    rises = table[table["fitness"] == table.groupby("trial")["fitness"].cummax()]
-    last = [last_population(run, trial) for trial in table["trial"].unique()]
-    chosen = [run.initial(), rises, run.best(BEST_GAITS), run.reevaluations, elites(run), *last]
-    return {(row["trial"], row["index"]) for table in chosen for _, row in table.iterrows()}
-
-
-def last_population(run: Run, trial: int) -> pandas.DataFrame:
-    """The population of a trial after its last iteration: rows of `evaluations`."""
-    rows = run.evaluations[run.evaluations["trial"] == trial]
-    if "placed" not in rows:
-        return rows.iloc[:0]
-    # The last vector that was placed at an index is the member there.
-    rows = rows.dropna(subset="placed").drop_duplicates("placed", keep="last")
-    return rows.sort_values("placed")
+    first = run.evaluations[run.evaluations["trial"] == 0]
+    early = [_rises(first), run.initial() if initial else first[first["iteration"] == 0]]
+    chosen = [*early, run.best(BEST_GAITS), run.reevaluations, elites(run)]
+    return set().union(*map(_keys, chosen))
 
 
 def _that_choose(scenario: Scenario) -> set[str]:
     """Metrics that select gaits of a run: objective, requirements, and measures of a map."""
     measures = getattr(scenario.optimizer, "measures", ())
     return {"distance", *scenario.objective, *scenario.require, *measures}
+
+
+def _kept(entry: Mapping[str, Any], metrics: Container[str]) -> dict[str, Any]:
+    """Entry of a kept gait, with all digits of these metrics."""
+    rounded = {
+        name: value if name in metrics else _rounded(value, _KEPT_DIGITS)
+        for name, value in entry["metrics"].items()
+    }
+    return dict(entry) | {"metrics": rounded}
 
 
 def _thinned(entry: Mapping[str, Any], metrics: Container[str]) -> dict[str, Any]:

@@ -16,7 +16,6 @@ import pytest
 from helpers.brief import BRIEF
 
 import tetra_drake as td
-from tetra_drake.errors import InputError
 from tetra_drake.report.result_folder import save_result_folder
 from tetra_drake.robot.gait_file import save_gait
 from tetra_drake.scenario.load import load_scenario
@@ -101,35 +100,6 @@ def test_a_run_stands_for_its_scenario_and_its_best_gait():
     result = td.simulate(run.scenario, run.best_gait())
     assert td.simulate("runs/demo", "runs/demo").metrics == result.metrics
     assert td.simulate(run, run).metrics == td.simulate(result, run).metrics == result.metrics
-
-
-@pytest.mark.parametrize(
-    ("call", "named"),
-    [
-        (lambda: td.seeded_gait("quick", -1), ("seeded_gait", "seed")),
-        (lambda: td.simulate(td.seeded_gait("quick"), "quick"), ("scenario", "")),
-        (lambda: td.simulate("quick", 5), ("gait", "")),
-        (lambda: td.simulate("quick", "runs"), ("runs", "")),
-        (lambda: td.load_result(None), ("load_result", "folder")),
-        (lambda: td.load_gait(5, td.load_scenario("quick")), ("load_gait", "path")),
-        (lambda: td.evolve("quick", 5), ("evolve", "out")),
-        (lambda: td.robustness("quick", {}, seed=-1), ("robustness", "seed")),
-        (lambda: td.robustness("quick", {}, draws="3"), ("robustness", "draws")),
-        (lambda: td.robustness("quick", {}, percent="3"), ("robustness", "percent")),
-        (lambda: td.robustness("quick", 5), ("gait", "")),
-        (lambda: td.export("quick", td.seeded_gait("quick"), "a", rate="3"), ("export", "rate")),
-        (lambda: td.ParameterSpace.of("quick").repair([1.0]), ("ParameterSpace", "vector")),
-        (
-            lambda: td.ParameterSpace.of("quick").gait([-1.0] * 26, name="g"),
-            ("gait g", "weight 2->1 extensor"),
-        ),
-    ],
-)
-def test_an_argument_that_stands_for_nothing_is_named(call, named):
-    with pytest.raises(InputError) as caught:
-        call()
-    assert (caught.value.source, caught.value.key) == named
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", [n for n in td.__all__ if inspect.isfunction(getattr(td, n))])

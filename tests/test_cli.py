@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tetra_drake.cli import main, make_parser
 from tetra_drake.formatting import rounded
@@ -54,28 +55,7 @@ def unchanged(work):
     assert contents() == before
 
 
-# A name that no file can have. Messages have no control characters.
-NUL = ["simulate", "simulate --scenario short.yaml --out", "export --scenario short.yaml --out"]
-NUL += ["evolve --scenario quick --out", "fit", "structure"]
-
-REFUSED = [
-    ("", "", "COMMAND"),
-    ("simulate --seed 1 good.json", " simulate", "FILE|RUN --seed"),
-    ("cpg good.json --gait good.json --out a", " cpg", "--gait FILE|RUN"),
-    ("simulate --sceanrio thesis", " simulate", "--sceanrio '--scenario'?"),
-    ("figures a --width 3.4", " figures", "--width '3.4' '3.4 in'"),
-    ("video a --out a.mp4 --fps 1e9", " video", "'1e9' 240"),
-    ("video a --out a.mp4 --size 9998x64", " video", "'9998x64' 4096"),
-    ("simulate --scenario key.yaml", ": key.yaml", "robot.tetrahedron tetrahedra"),
-    ("simulate --engine compiled --meshcat", ": scenario thesis", "engine compiled"),
-    ("simulate --scenario short.yaml --out good.json", ": good.json", ""),
-    ("simulate --scenario columb", ": columb", "'coulomb'?"),
-    ("simulate --scenario scenarios/coulom", ": scenarios/coulom", "'coulomb'?"),
-    ("structure six_baer", ": six_baer", "'six_bar'?"),
-    ("structure prism --mode 1", ": structure: --mode", "needs --out"),
-    ("structure prism --mode 99 --out page.html", ": prism: mode", "found 99"),
-    *((f"{command} b\0", r": b\x00", "") for command in NUL),
-]
+REFUSED = yaml.safe_load(Path(__file__).with_name("refused_commands.yaml").read_text("utf-8"))
 
 
 @pytest.mark.parametrize(("command", "source", "values"), REFUSED)

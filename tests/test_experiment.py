@@ -67,9 +67,7 @@ QUICK = {"reevaluate": False, "report": False}
 @pytest.mark.parametrize(
     "make", [ThreadPoolExecutor, pytest.param(WorkerProcesses, marks=pytest.mark.slow)]
 )
-def test_a_run_is_evolved_checked_on_the_diagram_and_reported(
-    make, tiny, tmp_path, reports, monkeypatch
-):
+def test_a_run_is_evolved_and_checked(make, tiny, tmp_path, reports, monkeypatch):
     """With threads in place of worker processes, and with these."""
     progress, made = MagicMock(spec=Progress), MagicMock(wraps=make)
     monkeypatch.setattr("tetra_drake.evolution.evaluators.WorkerProcesses", made)
@@ -107,8 +105,6 @@ def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
 
     first, second = evolve(1), evolve(2)
     assert (second.manifest.seed, len(second.evaluations)) == (2, len(first.evaluations))
-    with refused("evolve", "overwrite", "resume"):
-        evolve(3, resume=True)
     with RunRecord.resume(tmp_path / "run"), refused(tmp_path / "run", "", "at work"):
         evolve(3)
     assert tetra_drake.load_run(tmp_path / "run").manifest.seed == 2
@@ -116,20 +112,6 @@ def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
     with refused(tmp_path / "run", "", "holds no manifest.json"):
         evolve(3)
     assert (tmp_path / "run" / "trial_00").is_dir()
-
-
-WRONG = {"workers": 0, "seed": "1", "optimizer": "!CmaEs", "objective": 1.0, "executor": 2}
-
-
-@pytest.mark.parametrize(("key", "value"), [*WRONG.items(), ("progress", print)])
-def test_wrong_arguments_are_refused_at_once(tiny, tmp_path, run_small, refused, key, value):
-    run = run_small()
-    before = read_record(run)
-    for out in (run, tmp_path / "new"):
-        with refused("evolve", key, "expected"):
-            tetra_drake.evolve(tiny, out, overwrite=True, **{key: value})
-    assert read_record(run) == before
-    assert not (tmp_path / "new").exists()
 
 
 def scaled(factor):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from helpers import quick_figures
 from helpers.actuations import MOTOR
 from helpers.brief import BRIEF
@@ -20,29 +21,9 @@ FIELD = {"robot.contacts": "all", "terrain": "!HeightField {file: heights.txt, c
 MAP = {"optimizer": {"_tag": "QualityDiversity", "cells": [2, 2]}}
 SCENARIOS = {"force": ("coulomb", FIELD), "map": ("coulomb", MAP), "motor": ("coulomb", MOTOR)}
 
-PLAY = "simulate --command export_{0}/command.csv --scenario export_{0}/scenario.yaml"
-WRITERS = {
-    "simulate": "simulate --scenario force.yaml",
-    "export_force": "export --scenario force.yaml",
-    "export_motor": "export --scenario motor.yaml",
-    "play_force": PLAY.format("force"),
-    "play_motor": PLAY.format("motor"),
-    "evolve": "evolve --scenario force.yaml --no-reevaluate --workers 1",
-    "evolve_map": "evolve --scenario map.yaml --no-reevaluate --workers 1",
-    "robustness": "robustness evolve --draws 1 --workers 1",
-    "compare": "compare evolve",
-    "figures": "figures simulate",
-}
-"""Commands by the folders that they write."""
-
-RESULTS = {"simulate", "play_force", "play_motor"}
-RUNS = {"evolve", "evolve_map"}
-READERS = {
-    **dict.fromkeys(("replay {}", "figures {}"), RESULTS | RUNS),
-    **dict.fromkeys(("simulate {}", "export {}", "cpg {}", "compare {}"), RUNS),
-    "robustness {} --draws 1 --workers 1": RUNS,
-}
-"""Commands that take a folder, with the folders that they read."""
+WRITERS, READERS = yaml.safe_load(
+    Path(__file__).with_name("folders.yaml").read_text("utf-8")
+).values()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -66,7 +47,7 @@ def written(tmp_path_factory) -> Path:
         for name, command in WRITERS.items():
             assert main([*command.split(), "--out", name]) == 0, command
     (folder / "heights.txt").unlink()  # what is written needs no other file
-    return folder.rename(folder.with_name("moved"))
+    return folder.rename(f"{folder}_moved")
 
 
 @pytest.mark.parametrize("writer", WRITERS)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import numbers
 import re
 from collections.abc import Callable, Mapping, Sequence
 from types import NoneType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 _LONGEST, _QUOTED, _CUT, _LONGEST_PATH = 270, 60, 200, 4096
 """Largest numbers of characters in a message: of key and problem together; of a key or a quotation,
@@ -79,6 +84,28 @@ def check_type(source: object, key: str, value: object, *kinds: Any) -> None:
     if is_truth or not isinstance(value, kinds):
         expected = " or ".join(_IN_WORDS.get(kind, kind.__name__) for kind in kinds)
         raise InputError(source, key, f"found {value!r:.60}, expected {expected}")
+
+
+def checked_numbers(
+    given: npt.ArrayLike, *shapes: tuple[int, ...], source: str, key: str, finite: bool = False
+) -> np.ndarray:
+    """Converts an argument to real numbers (floats) of one of the given shapes. Raises InputError
+    for anything else, and with `finite` for nan and inf. Its message names `source`, the class or
+    function, and `key`, the argument, with the index of a number that is not finite."""
+    import numpy as np  # the command line starts without it
+
+    found = ""
+    with contextlib.suppress(TypeError, ValueError):
+        array = np.asarray(given)
+        if array.dtype.kind in "iuf" and not np.ma.is_masked(given):
+            if array.shape not in shapes:
+                found = f"the shape {array.shape}"
+            elif finite and (bad := ~np.isfinite(array)).any():
+                found, key = str(array[bad][0]), f"{key}{np.argwhere(bad)[0].tolist()}"
+            else:
+                return array.astype(float)
+    expected = f"{'finite' if finite else 'real'} numbers of shape {shapes[0]}"
+    raise InputError(source, key, f"found {found or repr(given):.60}, expected {expected}")
 
 
 class SimulationFailure(RuntimeError):

@@ -1,14 +1,16 @@
 """Hooks of MkDocs that make the site from the files of the repository, without a copy of any page.
 
 Pages are the Markdown files in Git, at their places in it, so that their links hold. Beside them
-are the files to which they lead: pictures and replays as they are, sources as pages, folders as
-lists of their sources. The page of a tutorial has what its script prints and draws at the build.
+are the files to which they lead: pictures as they are, sources as pages, folders as lists of their
+sources. The page of a tutorial has what its script prints and draws at the build. The picture of a
+recorded run opens its replay, which the build makes.
 """
 
 from __future__ import annotations
 
 import ast
 import fnmatch
+import functools
 import hashlib
 import logging
 import re
@@ -36,11 +38,13 @@ TUTORIALS = "diagrams/tutorials"
 RUNS = ROOT / "out/tutorials"
 """What tutorials print and draw, kept for the next build with the same sources."""
 PACKAGE, STUB = "tetra_drake", "tetra_drake/__init__.pyi"
-BESIDE = "runs/meshcat.js"
-"""What replays load."""
+REPLAYS = ROOT / "out/replays"
+"""Replays of the recorded runs, kept for the next build with the same sources and gaits."""
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".cff": "yaml"}
 """Endings of sources that are shown as pages, with their languages."""
 _LINK = re.compile(r"""(\]\(|\b(?:src|href)=")([^)"#:\s]+)(?=[)"#])""")
+_WALKING = re.compile(r'(<img src="([^":]*)walking\.(?:png|gif)"[^>]*>)')
+"""The picture of a recorded run, and its folder."""
 _HEADED_LIST = re.compile(r"^(\*[^\n]+\*)\n(?=- )", re.MULTILINE)
 """A line before a list, which needs an empty line between for Python-Markdown."""
 _DOCTEST = re.compile(r"^>>> .*(?:\n(?=\S).*)*", re.MULTILINE)
@@ -97,7 +101,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     names = tracked()
     folders = {str(folder) for name in names for folder in Path(name).parents}
     no_pages = {name for rest in config.extra["no_pages"] for name in fnmatch.filter(names, rest)}
-    todo = [name for name in names if name.endswith(".md") and name not in no_pages] + [BESIDE]
+    todo = [name for name in names if name.endswith(".md") and name not in no_pages]
     for name in todo:  # which grows
         if name.endswith(".md"):
             text = (ROOT / name).read_text(encoding="utf-8")
@@ -114,13 +118,16 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             if kept := files.get_file_from_path(picture):
                 files.remove(kept)
             files.append(File.generated(config, picture, abs_src_path=str(output.picture)))
+    for file in sorted(replays().rglob("*.*")):
+        name = f"runs/{file.relative_to(replays())}"
+        files.append(File.generated(config, name, abs_src_path=str(file)))
     for page, module in (("api", PACKAGE), ("api_systems", f"{PACKAGE}.systems")):
         files.append(File.generated(config, f"{page}.md", content=api_page(module)))
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Leads links to sources and folders to their pages."""
+    """Leads links to sources and folders to their pages, and pictures of runs to replays."""
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]
 
@@ -128,7 +135,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         name = normpath(join(dirname(page.file.src_uri), link[2]))
         return link[1] + link[2].rstrip("/") + page_of(name).removeprefix(name)
 
-    return _HEADED_LIST.sub(r"\1\n\n", _LINK.sub(to_page, markdown))
+    markdown = _HEADED_LIST.sub(r"\1\n\n", _LINK.sub(to_page, markdown))
+    return _WALKING.sub(r'<a href="\2replay.html">\1</a>', markdown)
 
 
 def on_post_page(output: str, **_: Any) -> str:
@@ -181,13 +189,12 @@ def folder_page(folder: Path) -> str:
 
 
 def api_page(module: str) -> str:
-    """Page of the names that a module exports, from the imports in its stub or in itself."""
+    """Page of the names that a package exports, from the imports in its stub."""
     stub = ROOT / STUB
-    source = stub if module == PACKAGE else stub.parent / module.rpartition(".")[2] / "__init__.py"
+    source = stub if module == PACKAGE else stub.parent / module.rpartition(".")[2] / stub.name
     tree = ast.parse(source.read_text(encoding="utf-8"))
     imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.module]
     names = [(node.module, name.name) for node in imports for name in node.names]
-    names = [(where, name) for where, name in names if where != "__future__"]
     text = [f"# `{module}`\n", *(f"::: {where}.{name}\n" for where, name in names)]
     return "\n".join(text)
 
@@ -232,6 +239,23 @@ def run(script: Path, wanted: str) -> Output:
             Path(work, drawn).rename(kept / drawn)
             kept.rename(folder)
     return Output((folder / "printed.txt").read_text(encoding="utf-8").rstrip(), folder / drawn)
+
+
+@functools.cache
+def replays() -> Path:
+    """Folder with the replays of the recorded runs, and what they load."""
+    gaits = [ROOT / name for name in tracked() if fnmatch.fnmatch(name, "runs/*/best_gait.json")]
+    sources = [*gaits, *sorted((ROOT / PACKAGE).rglob("*.py"))]
+    digest = hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
+    folder = REPLAYS / digest[:16]
+    if not folder.exists():
+        _log.info("Making the replays of the recorded runs")
+        REPLAYS.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=REPLAYS) as work:
+            made, script = Path(work, "made"), ROOT / "runs/gallery.py"
+            subprocess.run([sys.executable, script, "--replays", made], cwd=ROOT, check=True)
+            made.rename(folder)
+    return folder
 
 
 def tutorial_page(script: Path, output: Output) -> str:

@@ -23,6 +23,15 @@ from tetra_drake import systems
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.visualization.replay import quiet_meshcat
 
+SCRIPTS = [
+    (single_oscillator, {"weights": [1.0, 2.0], "ratios": [3.0]}, 3),
+    pytest.param(entrainment, {}, 2, marks=pytest.mark.slow),
+    (settling_node, {}, 2),
+    (sliding_tetrahedron, {"speed": 0.5, "slope": 0.05, "law": "!Coulomb"}, 1),
+    (tetrahedron_on_incline, {}, 1),
+    (robot, {"duration": 0.1}, 2),
+]
+
 
 def slide_briefly(scenario, *, duration, speed=0.0, of=tetrahedron_on_incline.simulate):
     """A tenth of a motion on the incline."""
@@ -30,17 +39,7 @@ def slide_briefly(scenario, *, duration, speed=0.0, of=tetrahedron_on_incline.si
 
 
 @pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
-@pytest.mark.parametrize(
-    ("script", "options", "files"),
-    [
-        (single_oscillator, {"weights": [1.0, 2.0], "ratios": [3.0]}, 3),
-        pytest.param(entrainment, {}, 2, marks=pytest.mark.slow),
-        (settling_node, {}, 2),
-        (sliding_tetrahedron, {"speed": 0.5, "slope": 0.05, "law": "!Coulomb"}, 1),
-        (tetrahedron_on_incline, {}, 1),
-        (robot, {"duration": 0.1}, 2),
-    ],
-)
+@pytest.mark.parametrize(("script", "options", "files"), SCRIPTS)
 def test_a_script_writes_its_pictures(script, options, files, tmp_path, monkeypatch):
     monkeypatch.setattr(tetrahedron_on_incline, "simulate", slide_briefly)
     script.main(out=tmp_path, **options)

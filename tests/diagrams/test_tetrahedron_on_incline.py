@@ -88,15 +88,11 @@ def test_thrown_uphill_it_stops_and_stays():
 FACTORS = {"forward": 1.5, "backward": 2.0, "lateral": 0.5}
 
 
-@pytest.mark.parametrize(
-    ("degrees", "factor"),
-    [
-        (0.0, 1.5),
-        (90.0, 0.5),
-        # On the ellipse: 1 / sqrt((cos / a_f)^2 + (sin / a_l)^2).
-        (120.0, 1.0 / math.hypot(0.5 / 2.0, math.sqrt(0.75) / 0.5)),
-    ],
-)
+# On the ellipse: 1 / sqrt((cos / a_f)^2 + (sin / a_l)^2).
+ASLANT = 1.0 / math.hypot(0.5 / 2.0, math.sqrt(0.75) / 0.5)
+
+
+@pytest.mark.parametrize(("degrees", "factor"), [(0.0, 1.5), (90.0, 0.5), (120.0, ASLANT)])
 def test_friction_has_the_factor_of_the_direction_of_slip(degrees, factor):
     # It lands and is thrown with its heading along x. On level ground friction opposes the
     # velocity, so the path is straight, but for a yaw while it rocks.

@@ -132,6 +132,10 @@ def rows() -> Iterable[Any]:
     drive = gait(**{f"gain {pathway}": 1.0 for pathway in PATHWAYS})
     within = {"p_WN": 1e-6, "signal": 2e-5}
     yield row("feedback", "thesis", 0.1, changes, CONVERGE, within, drive)
+    changes = {"cpg": "!Phase {gain: 2 N, start_up: 0 s}", "friction": COULOMB}
+    changes["cpg.feedback"] = list(PATHWAYS)
+    within = {"p_WN": 1e-6, "signal": 2e-5}
+    yield row("phase oscillators", "thesis", 0.15, changes, CONVERGE, within, drive, 1e-4)
     for signals in ("listing", "live"):
         changes = {"cpg.signals": signals, "cpg.listing_step": "1e-4 s", "gait_bounds.turn": 0.0}
         name = f"steering, {signals}"

@@ -9,6 +9,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import InputError
 from tetra_drake.robot.command import controlled_robot
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
@@ -58,6 +59,37 @@ def test_a_controller_walks_alike_on_all_engines(walking, controller, engine):
     np.testing.assert_allclose(ours, theirs, atol=0.01)
     assert found.gait is None and found.engine == engine[1:].lower()
     assert "<iframe" in found.show()._repr_html_()
+
+
+@pytest.mark.parametrize("kind", [RuntimeError, InputError, KeyboardInterrupt])
+def test_what_a_controller_raises_comes_through_as_it_is(walking, engine, kind):
+    """And is no failure of the simulation, which a RuntimeError of Drake's is."""
+    error = kind("f", "x", "mine") if kind is InputError else kind("mine")
+
+    def fails(time: float, readings: Readings) -> np.ndarray:
+        if time > 0.05:
+            raise error
+        return np.ones(4)
+
+    with pytest.raises(kind) as caught:
+        simulate(shortly(walking, 0.1, engine=engine), controller=fails)
+    assert caught.value is error
+
+
+@pytest.mark.parametrize(
+    ("actions", "key", "facts"),
+    [
+        (np.ones(3), "actions", ("the shape (3,)", "(4,)")),
+        ("fast", "actions", ("'fast'",)),
+        ([1.0, 1.0, np.nan, 1.0], "actions[2]", ("nan",)),
+    ],
+)
+def test_wrong_actions_of_a_controller_are_told_in_a_line(
+    walking, engine, actions, key, facts, refused
+):
+    short = shortly(walking, 0.1, engine=engine)
+    with refused("controller", key, *facts):
+        simulate(short, controller=lambda time, _: actions if time > 0.05 else np.ones(4))
 
 
 def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):

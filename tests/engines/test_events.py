@@ -9,12 +9,12 @@ from helpers.anchored import floating_prism
 from helpers.converged import shortly
 from helpers.states import energy_and_momenta
 
-from tetra_drake.engines.engine import engine_of
+from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.laws.kinematics import P_WN, V_WN
 from tetra_drake.robot.command import Command, controlled_robot
 from tetra_drake.robot.parameter_space import seeded_gait
+from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import moved_nodes
@@ -40,7 +40,7 @@ def test_a_cut_takes_the_energy_of_its_spring_and_a_loss_the_momentum_of_its_mas
     scenario = floating_prism(duration=0.5).with_changes(changes)
     robot = controlled_robot(scenario)
     driven = DrivenRobot(robot=robot, name="still", samples=robot.first_signals[np.newaxis])
-    batch = engine_of(scenario).start([driven], record=True)
+    batch = LaneBatch(driven, record=True)
     batch.advance()
 
     parts = batch.motion(0).by_phase(robot)
@@ -89,22 +89,26 @@ def test_events_at_the_start_give_the_changed_scenario(walk):
     assert np.abs(event - plain).max() > 1e-4
 
 
-def test_a_cut_cable_has_no_tension_in_steps_of_a_program_and_in_a_command(walk):
-    events = [{"at": "0.1303 s", "cut": ["T1-T2 outer bottom_left"]}]
-    scenario = walk.with_changes({"events": events})
+@pytest.mark.parametrize("at", [0.1303, 0.14])  # between two actions, and at the time of one
+def test_a_cut_cable_has_no_tension_under_a_controller_and_a_command(walk, at):
+    events = [{"at": f"{at} s", "cut": ["T1-T2 outer bottom_left"]}]
+    scenario, seen = walk.with_changes({"events": events}), []
     actions = 2.0 + np.sin(np.arange(15))[:, np.newaxis] * [1.0, -1.0]
-    simulation = Simulation(scenario, record=True)
-    for each in actions:
-        readings = simulation.step(each)
-    steps = simulation.result().trajectory
+
+    def controller(time: float, readings: Readings) -> np.ndarray:
+        seen.append(readings.tensions[0])
+        return actions[round(time / 0.02)]
+
+    controlled = simulate(scenario, controller=controller, record=True).trajectory
     command = simulate(scenario, command=Command("same", 0.02, actions), record=True).trajectory
-    for trajectory in (steps, command):
+    for trajectory in (controlled, command):
         tension = trajectory.tension.sel(cable="T1-T2 outer bottom_left")
-        assert (tension[trajectory.time <= 0.1303] > 1.0).all()
-        assert (tension[trajectory.time > 0.131] == 0.0).all()
-    assert readings.tensions[0, 0] == 0.0
+        assert (tension[trajectory.time <= at] > 1.0).all()
+        assert (tension[trajectory.time > at + 1e-3] == 0.0).all()
+    knows = np.array(seen) == 0.0  # an action at the time of the event does not know of it yet
+    assert knows.tolist() == [0.02 * period > at + 1e-3 for period in range(15)]
     within = 1e-3 if walk.engine_name == "drake" else 1e-6
-    np.testing.assert_allclose(steps.p_WN, command.p_WN, rtol=0.0, atol=within)
+    np.testing.assert_allclose(controlled.p_WN, command.p_WN, rtol=0.0, atol=within)
 
 
 @pytest.mark.parametrize("kind", LIMITED)

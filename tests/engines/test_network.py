@@ -14,7 +14,7 @@ from helpers.gaits import with_values
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.laws.matsuoka import Weights
+from tetra_drake.laws.matsuoka import connections, weight_names
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.parameter_space import seeded_gait
@@ -39,12 +39,10 @@ def mirrored(trajectory: xarray.Dataset) -> np.ndarray:
 
 def image(gait: Gait, scenario: Scenario) -> Gait:
     """The gait whose oscillators have changed sides."""
-    weights = Weights(scenario.blueprint(), scenario.cpg.reach)
-    names = [f"weight {name}" for name in weights.names]
-    exchanged = {
-        name: gait.parameters[names[image]]
-        for name, image in zip(names, weights.images.tolist(), strict=True)
-    }
+    blueprint = scenario.blueprint()
+    pairs = connections(blueprint, scenario.cpg.reach)
+    names = weight_names(pairs, range(blueprint.signals)), weight_names(pairs, blueprint.images)
+    exchanged = {name: gait.parameters[other] for name, other in zip(*names, strict=True)}
     return with_values(gait, turn=-gait.turn, **exchanged)
 
 

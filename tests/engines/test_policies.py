@@ -10,9 +10,8 @@ from helpers.brief import BRIEF
 import tetra_drake as td
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
-from tetra_drake.robot.command import Command
+from tetra_drake.robot.command import Command, controlled_robot
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.gait_file import load_gait, save_gait
 from tetra_drake.robot.parameter_space import ParameterSpace
@@ -35,9 +34,9 @@ def brief(name="prism", policy="!Linear {}", **changes):
 def test_the_rolling_policy_moves_the_rover_as_a_controller_of_its_formula_does():
     scenario = brief("rover", "!Rolling {}", simulation__duration="1.5 s")
     plain = scenario.with_changes({"policy": None})
-    simulation = Simulation(plain)
-    structure, rest = simulation.robot.structure, simulation.rest[0]
-    cables = structure.cables[simulation.robot.driven]
+    robot = controlled_robot(plain)
+    structure, rest = robot.structure, plain.actuation.commands(robot.starting_cables())
+    cables = structure.cables[robot.driven]
     rod = structure.p_WN[structure.struts[0]]
     half = 0.5 * float(np.linalg.norm(rod[1] - rod[0]))
 
@@ -66,7 +65,7 @@ def test_a_linear_policy_without_weights_is_a_command_of_its_biases(name, engine
     cut = driven_names(scenario.robot.blueprint())[0]
     events = [{"at": "0.11 s", "cut": [cut]}]
     scenario = scenario.with_changes({"events": events, "simulation.duration": "0.16 s"})
-    robot = Simulation(scenario).robot
+    robot = controlled_robot(scenario)
     biases = np.linspace(-0.3, 0.6, robot.driven.size)
     values = {key: 0.0 for key in scenario.parameters}
     values |= dict(zip([key for key in values if key.startswith("bias")], biases, strict=True))
@@ -178,11 +177,14 @@ def test_a_policy_of_ones_own_is_found_by_its_import_path():
     [
         ("!Python {function: 'nowhere:f', count: 1}", "policy.function: nowhere:f: cannot be"),
         (f"!Python {{function: '{__name__}:ENGINES', count: 1}}", "expected a function"),
-        (f"!Python {{function: '{__name__}:short', count: 2}}", "short: returned an array"),
-        (f"!Python {{function: '{__name__}:undefined', count: 1}}", "undefined: returned a number"),
+        (f"!Python {{function: '{__name__}:short', count: 2}}", "short: found the shape (1, 1)"),
+        (
+            f"!Python {{function: '{__name__}:undefined', count: 1}}",
+            "undefined[0, 0]: found nan",
+        ),
         ("!Linear {readings: [lengths, smells]}", "smells"),
         ("!Linear {readings: [lengths, lengths]}", "policy.readings: found"),
-        ("!Python {function: 'm:f', count: 1, bounds: [1, 0]}", "policy.bounds: found 1.0 and"),
+        ("!Python {function: 'm:f', count: 1, bounds: [1, 0]}", "policy.bounds: found 1 to 0"),
     ],
 )
 def test_a_wrong_policy_is_refused(policy, expected):
@@ -200,7 +202,7 @@ def test_what_does_not_go_with_a_policy_is_refused(tmp_path):
             scenario.with_changes({key: value, "cpg.signals": "live"})
     with pytest.raises(InputError, match="unknown names, such as 'weight"):
         simulate(scenario, gait)
-    with pytest.raises(InputError, match="lacks 25 names"):
+    with pytest.raises(InputError, match="lacks 26 names"):
         simulate(thesis, values)
     with pytest.raises(InputError, match="steering"):
         simulate(scenario, values, steering=0.5)

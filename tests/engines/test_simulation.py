@@ -1,4 +1,4 @@
-"""Robots in control periods: Simulation(count=N), on the compiled engine and on the diagram."""
+"""Robots in control periods, Simulation(count=N), and controllers that do the same."""
 
 import copy
 import functools
@@ -27,7 +27,6 @@ SPANS = {"!Force": 2.0, "!Winch": 0.01, "!TensionMotor": 1.0}
 """Actions differ from those at rest by up to this, in N, m and N."""
 
 
-OTHERS = ("!Drake", "!Mujoco")
 READINGS = {"length": "lengths", "normal_force": "normal_forces", "tension": "tensions"}
 READINGS |= {name: name for name in ("p_WN", "v_WN", "q_WB")}
 """Of variables of a trajectory."""
@@ -53,30 +52,32 @@ def go(simulation: Simulation, actions: np.ndarray) -> list:
     return [simulation.state, *(simulation.step(each) for each in actions)]
 
 
-@pytest.mark.parametrize(
-    ("engine", "count"), [("!Compiled", 1), ("!Compiled", LANES), ("!Drake", 1), ("!Mujoco", 1)]
-)
-@pytest.mark.parametrize(("actuation", "steps"), [(FORCE, 7), (WINCH, 12), (MOTOR, 1)])
-def test_steps_with_the_samples_of_a_command_give_its_motion(
-    short, actuation, steps, engine, count
-):
-    period, periods = steps * short.cpg.listing_step, 6
-    shares = {"duration": periods, "steady_from": 2.625, "sample_period": 0.5}
+ACTUATIONS = [(FORCE, 7), (WINCH, 12), (MOTOR, 1)]
+"""Kinds of actuators, and steps of the listing in a control period."""
+
+
+def brief(scenario: Scenario, actuation: dict, steps: int, *, periods: int = 6) -> Scenario:
+    """A few control periods of two tetrahedra, with a sample in the middle of each."""
+    period = steps * scenario.cpg.listing_step
+    shares = {"duration": periods, "steady_from": 2.625, "sample_period": 0.5, "control_period": 1}
     times = {f"simulation.{key}": share * period for key, share in shares.items()}
-    small = {"engine": engine, "robot.tetrahedra": 2}
-    scenario = short.with_changes(actuation | small).with_numbers(times)
-    simulation = Simulation(scenario, count=count, control_period=period, record=True, workers=1)
-    actions = drawn_actions(simulation)[:periods]
+    return scenario.with_changes(actuation | {"robot.tetrahedra": 2}).with_numbers(times)
+
+
+@pytest.mark.parametrize("count", [1, LANES])
+@pytest.mark.parametrize(("actuation", "steps"), ACTUATIONS)
+def test_steps_with_the_samples_of_a_command_give_its_motion(short, actuation, steps, count):
+    scenario = brief(short, actuation, steps)
+    simulation = Simulation(scenario, count=count, record=True, workers=1)
+    period, actions = simulation.control_period, drawn_actions(simulation)[:6]
     found = go(simulation, actions)
     for robot in (0, count - 1):
         command = Command("drawn", period, actions[:, robot])
         expected = simulate(scenario, command=command, record=True)
         result, trajectory = simulation.result(robot), expected.trajectory
-        np.testing.assert_allclose(result.trajectory.p_WN, trajectory.p_WN, rtol=0, atol=1e-9)
-        if engine != "!Mujoco":
-            assert result.trajectory.equals(trajectory), "bit for bit"
-            assert result.integrator == expected.integrator
-            assert result.metrics.distance == expected.metrics.distance
+        assert result.trajectory.equals(trajectory), "bit for bit"
+        assert result.integrator == expected.integrator
+        assert result.metrics.distance == expected.metrics.distance
         for name, readings in READINGS.items():
             read = np.array([getattr(each, readings)[robot] for each in found[1:]])
             np.testing.assert_allclose(read, trajectory[name][2::2], rtol=0, atol=1e-6)
@@ -84,7 +85,43 @@ def test_steps_with_the_samples_of_a_command_give_its_motion(
             held = trajectory.signal[1::2]
             np.testing.assert_allclose(held, actions[:, robot], atol=1e-9)
             assert np.array_equal(trajectory.signal[0], actions[0, robot])
-    assert found[-1].time.tolist() == pytest.approx([periods * period] * count)
+    assert found[-1].time.tolist() == pytest.approx([6 * period] * count)
+
+
+@pytest.mark.parametrize(("actuation", "steps"), ACTUATIONS)
+def test_a_controller_that_gives_the_samples_of_a_command_gives_its_motion(
+    short, engine, actuation, steps
+):
+    actions = drawn_actions(Simulation(brief(short, actuation, steps)))[:6, 0]
+    scenario = brief(short, actuation, steps).with_changes({"engine": engine})
+    period, seen = scenario.simulation.control_period, []
+
+    def controller(time: float, readings: Readings) -> np.ndarray:
+        seen.append(readings)
+        return actions[len(seen) - 1]
+
+    found = simulate(scenario, controller=controller, record=True)
+    expected = simulate(scenario, command=Command("drawn", period, actions), record=True)
+    trajectory = expected.trajectory
+    np.testing.assert_allclose(found.trajectory.p_WN, trajectory.p_WN, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.trajectory.signal, trajectory.signal, rtol=0, atol=1e-9)
+    times = [float(readings.time) for readings in seen]
+    assert times == pytest.approx(period * np.arange(6), abs=1e-9), "asked once in each period"
+    for name, readings in READINGS.items():
+        read = np.array([getattr(each, readings) for each in seen[1:]])
+        np.testing.assert_allclose(read, trajectory[name][2:-2:2], rtol=0, atol=1e-6)
+    if engine == "!Compiled":
+        assert found.trajectory.equals(trajectory), "bit for bit"
+
+
+def test_robots_of_another_engine_are_simulated_and_not_stepped(short, engine, refused):
+    scenario = short.with_changes({"engine": engine})
+    if engine == "!Compiled":
+        assert Simulation(scenario).step(np.zeros(8)).time == [PERIOD]
+        return
+    with refused("scenario thesis", "engine", engine[1:].lower(), "on_engine('compiled')"):
+        Simulation(scenario)
+    assert not Simulation(scenario.on_engine("compiled")).ended[0]
 
 
 def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
@@ -131,16 +168,9 @@ def test_the_digits_of_a_robot_depend_neither_on_others_nor_on_threads(short):
         assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
 
 
-@pytest.mark.parametrize(
-    ("engine", "inner"),
-    [("!Compiled", (LaneThread, "simulate")), *((e, (Readings, "put")) for e in OTHERS)],
-)
-def test_after_an_interrupt_a_reset_makes_the_robots_whole(
-    short, engine, inner, monkeypatch, refused
-):
-    small = short.with_changes({"engine": engine, "robot.tetrahedra": 2})
-    two = Simulation(small, count=2, workers=1)
-    actions, call = drawn_actions(two)[:3], getattr(*inner)
+def test_after_an_interrupt_a_reset_makes_the_robots_whole(short, monkeypatch, refused):
+    two = Simulation(short.with_changes({"robot.tetrahedra": 2}), count=2, workers=1)
+    actions, call = drawn_actions(two)[:3], LaneThread.simulate
     expected = go(two, actions)[-1]
     two.reset()
     two.step(actions[0])
@@ -152,7 +182,7 @@ def test_after_an_interrupt_a_reset_makes_the_robots_whole(
             signal.raise_signal(signal.SIGINT)
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(*inner, interrupted)
+        patch.setattr(LaneThread, "simulate", interrupted)
         two.step(actions[1])
     with refused("Simulation", "step", "reset() all robots"):
         two.step(actions[1])
@@ -197,7 +227,7 @@ NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
             (lambda two, a=actions: two.step(a), "actions", ("real numbers of shape (2, 8)",))
             for actions in ("fast", np.zeros((2, 8), object), np.ma.masked_all((2, 8)))
         ),
-        (lambda two: two.step(NAN), "actions[1], T3-T4 outer bottom_left", ("nan",)),
+        (lambda two: two.step(NAN), "actions[1, 4]", ("nan",)),
         (lambda two: two.result(1), "result", ("robot 1 is at 0 s",)),
         *(
             (lambda two, i=indices: two.reset(indices=i), "indices", ("0 to 1",))

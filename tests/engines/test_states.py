@@ -1,4 +1,4 @@
-"""States that are saved, written and restored, and damage while a robot moves."""
+"""States that are saved, written and restored, and damage while a robot moves, in lanes."""
 
 import pickle
 
@@ -13,16 +13,13 @@ from tetra_drake.errors import Diverged
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
-ERRORS = {"!Compiled": 0.0, "!Drake": 1e-4, "!Mujoco": 1e-9}
-"""Largest difference (m) of a restored robot: on the diagram the integrator begins anew."""
 PERIODS, SAVED, CUT = 10, 6, "T1-T2 outer bottom_left"
 
 
 @pytest.fixture
-def walk(engine: str) -> Scenario:
-    """0.2 s of two disturbed tetrahedra with winches on an engine; the front loses its load."""
-    explicit = "!Drake {scheme: runge_kutta3}" if engine == "!Drake" else engine
-    changes = {"engine": explicit, "robot.tetrahedra": 2, "friction.stiffness": "0 N/m"}
+def walk() -> Scenario:
+    """0.2 s of two disturbed tetrahedra with winches; the front loses its load."""
+    changes = {"robot.tetrahedra": 2, "friction.stiffness": "0 N/m"}
     changes |= {"robot.payload": ["0 g", "3 g"], "events": [{"at": "0.11 s", "lose": ["T2"]}]}
     changes |= WINCH | {"disturbances": {"draws": 1, "start": 0.01}}
     return shortly(load_scenario("coulomb"), 0.2, **changes)
@@ -37,7 +34,7 @@ def go(simulation: Simulation, periods: range, *, seed: int = 0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("saved", [4, SAVED])  # before the event and after it
-def test_a_restored_robot_goes_on_in_any_place_as_if_it_had_not_stopped(walk, engine, saved):
+def test_a_restored_robot_goes_on_in_any_place_as_if_it_had_not_stopped(walk, saved):
     one, other = (Simulation(walk, count=n, record=True, workers=1) for n in (1, 3))
     one.reset(seed=[7])
     go(one, range(saved))
@@ -48,16 +45,12 @@ def test_a_restored_robot_goes_on_in_any_place_as_if_it_had_not_stopped(walk, en
     other.restore(early, [0, 1])
     assert (other.state.p_WN == states.tables["readings.p_WN"]).all()
     found = go(other, range(saved, PERIODS))
-    np.testing.assert_allclose(found, expected.repeat(3, axis=0), rtol=0.0, atol=ERRORS[engine])
+    assert (found == expected).all(), "bit for bit"
     again = other.result(2)
-    error = ERRORS[engine]
-    assert again.metrics.distance == pytest.approx(result.metrics.distance, abs=error)
-    np.testing.assert_allclose(again.trajectory.p_WN, result.trajectory.p_WN, rtol=0, atol=error)
-    if engine == "!Compiled":
-        assert again.metrics == result.metrics and again.trajectory.equals(result.trajectory)
+    assert again.metrics == result.metrics and again.trajectory.equals(result.trajectory)
 
 
-def test_a_robot_branches_and_a_copy_replays_it(walk, engine):
+def test_a_robot_branches_and_a_copy_replays_it(walk):
     robots = Simulation(walk, count=2, workers=1)
     robots.reset(seed=1)
     go(robots, range(SAVED))
@@ -68,13 +61,13 @@ def test_a_robot_branches_and_a_copy_replays_it(walk, engine):
     right = go(robots, range(SAVED, PERIODS), seed=2)
     robots.restore(branch[[1, 0]])
     replayed = go(robots, range(SAVED, PERIODS), seed=1)
-    np.testing.assert_allclose(replayed, left, rtol=0.0, atol=ERRORS[engine])
+    assert (replayed == left).all()
     assert np.abs(left - right).max() > 1e-3
     robots.reset(seed=1)
     assert np.abs(np.subtract(*go(robots, range(SAVED)))).max() > 1e-4
 
 
-def test_damage_is_an_events_cut_at_the_same_time_and_goes_with_the_state(walk, engine):
+def test_damage_is_an_events_cut_at_the_same_time_and_goes_with_the_state(walk):
     cut = {"at": f"{SAVED * walk.simulation.control_period} s", "cut": [CUT]}
     told = walk.with_sections(events=[])
     planned, free = told.with_changes({"events": [cut]}), Simulation(told, count=2, record=True)
@@ -83,20 +76,19 @@ def test_damage_is_an_events_cut_at_the_same_time_and_goes_with_the_state(walk, 
     go(free, range(SAVED))
     free.damage(1, cables=[CUT])
     free.restore(free.save([1], history=True), [0])
-    nodes, error = go(expected, range(SAVED, PERIODS)), ERRORS[engine]
-    found = go(free, range(SAVED, PERIODS))
-    np.testing.assert_allclose(found, nodes.repeat(2, axis=0), rtol=0.0, atol=error)
+    nodes, found = (go(each, range(SAVED, PERIODS)) for each in (expected, free))
+    assert (found == nodes).all()
     assert (free.state.tensions[:, 0] == 0.0).all()
     for place in (0, 1):
         tension = free.result(place).trajectory.tension - expected.result().trajectory.tension
-        assert np.abs(tension).max() < 10.0 * error + 1e-12 or engine == "!Drake"
+        assert np.abs(tension).max() < 1e-12
     free.reset()
     assert go(free, range(2)) is not None and (free.state.tensions[:, 0] > 0.0).all()
 
 
 @pytest.fixture
 def short() -> Scenario:
-    return shortly(load_scenario("quick"), 0.2)
+    return shortly(load_scenario("quick"), 0.2, engine="!Compiled")
 
 
 def test_states_are_values_and_a_damaged_file_is_refused(short, tmp_path, refused):
@@ -127,9 +119,8 @@ def test_states_are_values_and_a_damaged_file_is_refused(short, tmp_path, refuse
         States.load(path)
 
 
-def test_a_failed_robot_keeps_its_failure_and_the_others_go_on(engine, tmp_path):
-    scenario = shortly(load_scenario("quick"), 0.2, engine=engine)
-    one, other = (Simulation(scenario, count=2, workers=1) for _ in range(2))
+def test_a_failed_robot_keeps_its_failure_and_the_others_go_on(short, tmp_path):
+    one, other = (Simulation(short, count=2, workers=1) for _ in range(2))
     actions = one.rest.copy()
     actions[1] = 1e9
     seen = [one.step(actions) for _ in range(4)][-1]
@@ -139,11 +130,11 @@ def test_a_failed_robot_keeps_its_failure_and_the_others_go_on(engine, tmp_path)
     assert (other.restore(states).p_WN == seen.p_WN).all()
     assert repr(other.failures) == repr(one.failures) and other.ended.tolist() == [False, True]
     expected, found = one.step(one.rest), other.step(one.rest)
-    np.testing.assert_allclose(found.p_WN, expected.p_WN, rtol=0.0, atol=ERRORS[engine])
+    assert (found.p_WN == expected.p_WN).all()
     assert (found.p_WN[1] == seen.p_WN[1]).all()
     other.restore(states[0], [1])
     assert other.failures == [None, None]
-    np.testing.assert_allclose(other.step(one.rest).p_WN[1], found.p_WN[0], atol=ERRORS[engine])
+    assert (other.step(one.rest).p_WN[1] == found.p_WN[0]).all()
 
 
 WRONG = {

@@ -145,7 +145,7 @@ def felt(robot: Robot, *, longer: float = 1.0, pushes: float = 0.0, **gains: flo
     forces.ground_forces[:, NORMAL] = pushes * (p_WN[structure.contacts, 2] < 0.02)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
     modes[:, CONTACT] = forces.ground_forces[:, NORMAL] > 0.0
-    table = np.array([gain for _, gain in Gains(**gains)])
+    table = np.array(Gains(**gains))
     sense(robot.senses, table, state, modes, forces, feedback)
     return feedback.reshape(-1, 2)
 

@@ -60,7 +60,7 @@ def test_a_body_with_equal_bounds_changes_no_fitness(tmp_path, prism, kind):
     assert first == second and len(set(first)) == 12
 
 
-@pytest.mark.parametrize("kind", ALL)
+@pytest.mark.parametrize("kind", LEARNING)
 def test_a_stiffness_is_found_whose_best_is_known(tmp_path, kind):
     """A bar hangs its weight over the stiffness below the free length of its cable."""
     changes = {"cpg.start_up": "1 s", "simulation.steady_from": "0.01 s", "optimizer": kind}
@@ -93,9 +93,7 @@ def test_vectors_stay_within_the_bounds_of_a_body_and_come_near_them(prism, kind
 
     optimizer = optimizer_of(kind)(space, prism.evolution, np.random.default_rng(4))
     vectors = np.concatenate(optimise(optimizer, judged, 400)[0])
-    assert np.array_equal(
-        vectors[:, body], vectors[:, body].clip(space.low[body], space.high[body])
-    )
+    assert ((space.low <= vectors) & (vectors <= space.high))[:, body].all()
     best = max(vectors, key=lambda vector: sign * share(vector))
     assert abs(share(best) - 0.5 - 0.5 * sign) < (0.25 if kind == RandomSearch() else 0.1)
     assert np.array_equal(space.vector(space.gait(best, name="best")), best)
@@ -132,15 +130,15 @@ def test_disturbances_change_the_evolved_body(prism):
 ONTO_N0 = {"nodes.n3[0]": 0.1, "nodes.n3[1]": 0.0, "nodes.n3[2]": 0.0}
 
 
+IMPOSSIBLE = [
+    ({"struts.bar.diameter": ["8 mm", "90 mm"]}, "overlap"),
+    ({"loads.n3[2]": ["0 N", "10 N"]}, "equilibrium"),
+    ({key: [f"{place - 0.05} m", f"{place} m"] for key, place in ONTO_N0.items()}, "length 0"),
+]
+
+
 @pytest.mark.parametrize("seed", [None, (1, 2, 3)])
-@pytest.mark.parametrize(
-    ("bounds", "reason"),
-    [
-        ({"struts.bar.diameter": ["8 mm", "90 mm"]}, "overlap"),
-        ({"loads.n3[2]": ["0 N", "10 N"]}, "equilibrium"),
-        ({key: [f"{place - 0.05} m", f"{place} m"] for key, place in ONTO_N0.items()}, "length 0"),
-    ],
-)
+@pytest.mark.parametrize(("bounds", "reason"), IMPOSSIBLE)
 def test_a_body_that_cannot_be_fails_with_a_reason(prism, bounds, reason, seed):
     bounds = {"evolve": {f"robot.{key}": pair for key, pair in bounds.items()}}
     loads = {"robot.loads": {"n3": ["0 N", "0 N", "0 N"]}}
@@ -163,28 +161,3 @@ def test_a_gait_file_with_a_wrong_body_is_refused(tmp_path, prism, run, refused)
             load_gait(file, prism)
     with refused("ParameterSpace", "gait random gait 80", f"lacks the body's {SIDE}"):
         ParameterSpace.of(prism).vector(seeded_gait(prism.with_changes({"evolve": {}})))
-
-
-@pytest.mark.parametrize(
-    ("key", "bounds", "problem"),
-    [
-        (SIDE, ["400 N/m", "50 N/m"], "found 400 N/m to 50 N/m, expected the least value first"),
-        (SIDE, ["4 s", "50 N/m"], "found '4 s', expected a quantity that converts to N/m"),
-        (SIDE, [4.0, "50 N/m"], "found 4.0 without a unit"),
-        (SIDE, ["-4 N/m", "50 N/m"], "found '-4 N/m', expected greater than 0"),
-        (f"{SIDE}, friction.static", ["50 N/m", "60 N/m"], "expected a valid number"),
-        ("robot.cables.side.stifness", ["5 N/m", "6 N/m"], f"did you mean '{SIDE}'?"),
-        ("robot.cables.side.pairs", ["5 N/m", "6 N/m"], "found a list, expected the key of"),
-        ("robot.nodes.n3.z", ["5 cm", "6 cm"], "did you mean 'robot.nodes.n3'?"),
-        ("friction.kinetic", [0.1, 0.9], "found 0.9, expected at most static, 0.5"),
-        ("gait_bounds.tau_a_min", ["0.1 s", "0.2 s"], "is no key of the robot, expected a key of"),
-        ("engine.tolerance", ["1 m/s", "2 m/s"], "is no key of the robot, expected a key of"),
-    ],
-)
-def test_wrong_bounds_are_refused_with_their_key(prism, refused, key, bounds, problem):
-    with refused("scenario prism", f"evolve.{key}", problem):
-        prism.with_changes({"evolve": {key: bounds}})
-    with refused("scenario prism", f"evolve.{SIDE}", "is given twice"):
-        prism.with_changes({"evolve": {f"{SIDE}, {SIDE}": ["50 N/m", "60 N/m"]}})
-    with refused("scenario thesis", "evolve.robot.tetrahedra", "is a count"):
-        load_scenario("thesis").with_changes({"evolve": {"robot.tetrahedra": [3, 7]}})

@@ -116,9 +116,10 @@ def out_of_steps(scenario):
     return scenario.with_changes({"simulation.max_evaluations": 50})
 
 
-@pytest.mark.parametrize(
-    ("change", "kind"), [(beside_a_step, "no start"), (out_of_steps, "step budget")]
-)
+FAILING = [(beside_a_step, "no start"), (out_of_steps, "step budget")]
+
+
+@pytest.mark.parametrize(("change", "kind"), FAILING)
 def test_a_draw_that_fails_or_cannot_start_fails_its_gait(tiny, vector, change, kind):
     scenario = change(tiny)
     tasks = [Task(vector, index=i, seed=(1, 0, i)) for i in range(4)]

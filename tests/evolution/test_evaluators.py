@@ -5,9 +5,11 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 from types import ModuleType
 
 import pytest
+import yaml
 from helpers import analytic
 from helpers.converged import shortly
 
@@ -39,61 +41,38 @@ def test_a_function_that_workers_cannot_load_is_told(tasks, monkeypatch, capfd, 
     assert "only one process can load this" in capfd.readouterr().err
 
 
-PROGRAM = """
-import numpy as np
-import tetra_drake
-from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
-from helpers.analytic import Bowl, evaluated, small_scenario, tasks_of
-def objective(result):
-    return result.metrics.twist
-def evolve(**options):
-    times = {"simulation.duration": "20 ms", "simulation.steady_from": "10 ms"}
-    small = small_scenario(oscillators=2, population=4, iterations=1, trials=1)
-    options |= {"workers": 2, "reevaluate": False, "report": False}
-    run = tetra_drake.evolve(small.with_changes(times), "run", **options)
-    print(len(run.evaluations), run.statuses[0].failures)
-"""
+PROGRAM = yaml.safe_load(Path(__file__).with_name("program.yaml").read_text("utf-8"))
 PROGRAM_FROM_STDIN = ModuleType("__main__")
 PROGRAM_FROM_STDIN.__file__ = "<stdin>"
-EVALUATE = """
-with on_executor(Bowl(), WorkerProcesses, 1) as processes:
-    print(evaluated(processes, tasks_of(np.ones((1, 26)))))
-"""
 
 
 def run_program(folder, call, *, how):
     """A program that is a file, read from standard input or given by -c, as it has ended."""
-    program = PROGRAM + call
+    program = PROGRAM["program"] + call
     (folder / "program.py").write_text(program)
     source = {"file": [folder / "program.py"], "stdin": ["-"], "argument": ["-c", program]}[how]
-    return subprocess.run(
-        [sys.executable, *source],
-        input=program if how == "stdin" else None,
-        text=True,
-        capture_output=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-        timeout=300,  # s; a minute is too short beside other work
-        cwd=folder,
-    )
+    options = {"input": program if how == "stdin" else None, "text": True, "cwd": folder}
+    options["env"] = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    return subprocess.run([sys.executable, *source], capture_output=True, timeout=300, **options)
 
 
 @pytest.mark.slow
 def test_a_program_without_guard_is_told(tmp_path):
-    ended = run_program(tmp_path, EVALUATE, how="file")
+    ended = run_program(tmp_path, PROGRAM["evaluate"], how="file")
     assert ended.returncode == 1 and ended.stdout == ""
     error = ended.stderr.splitlines()[-1]
     assert "InputError" in error and "__main__" in error
 
 
-@pytest.mark.parametrize(
-    ("program", "problem"),
-    [
-        (ModuleType("__main__"), "what is defined interactively"),
-        (PROGRAM_FROM_STDIN, "'<stdin>' is no file"),
-        (None, "define it in a module"),
-    ],
-)
-def test_gaits_are_evaluated_in_this_process_if_others_cannot_import_the_program(
+PROGRAMS = [
+    (ModuleType("__main__"), "what is defined interactively"),
+    (PROGRAM_FROM_STDIN, "'<stdin>' is no file"),
+    (None, "define it in a module"),
+]
+
+
+@pytest.mark.parametrize(("program", "problem"), PROGRAMS)
+def test_gaits_are_evaluated_here_if_others_cannot_import_it(
     program, problem, tmp_path, monkeypatch
 ):
     def objective(result):
@@ -110,15 +89,11 @@ def test_gaits_are_evaluated_in_this_process_if_others_cannot_import_the_program
     assert len(run.evaluations) == 6 and run.evaluations["fitness"].notna().all()
 
 
+OF_NO_FILE = [("argument", "evolve(objective=objective)", True), ("stdin", "evolve()", True)]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("how", "call", "alone"),
-    [
-        ("argument", "evolve(objective=objective)", True),
-        ("stdin", "evolve()", True),
-        ("argument", "evolve()", False),
-    ],
-)
+@pytest.mark.parametrize(("how", "call", "alone"), [*OF_NO_FILE, ("argument", "evolve()", False)])
 def test_evolution_works_where_processes_cannot_import_the_program(how, call, alone, tmp_path):
     ended = run_program(tmp_path, call, how=how)
     assert ended.stdout == "6 0\n", ended.stderr

@@ -20,14 +20,10 @@ PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
 def run_and_kill(directory, executor, *, after=None, sign=signal.SIGKILL, delay=0.0):
     """Starts the run, ends it `after` s; its exit status."""
     # A session of its own: what the run leaves behind can be told from everything else.
-    with subprocess.Popen(
-        [sys.executable, PROGRAM, directory, executor, str(delay)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-    ) as process:
+    command = [sys.executable, PROGRAM, directory, executor, str(delay)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    paths = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(command, start_new_session=True, env=paths, **pipes) as process:
         assert process.stdout.readline() == "begun\n"
         if after is not None:
             time.sleep(after)
@@ -50,15 +46,13 @@ def uninterrupted(tmp_path_factory):
     return read_record(directory)
 
 
+KILLS = [("threads", signal.SIGKILL, 20, 0.4), ("processes", signal.SIGKILL, 5, 1.5)]
+KILLS += [("processes", sign, 1, 0.8) for sign in (signal.SIGINT, signal.SIGTERM)]
+MANY = [pytest.param(*kills, marks=pytest.mark.slow) for kills in KILLS]
+
+
 @pytest.mark.parametrize(
-    ("executor", "sign", "kills", "longest"),
-    [
-        ("threads", signal.SIGKILL, 1, 0.6),
-        pytest.param("threads", signal.SIGKILL, 20, 0.4, marks=pytest.mark.slow),
-        pytest.param("processes", signal.SIGKILL, 5, 1.5, marks=pytest.mark.slow),
-        pytest.param("processes", signal.SIGINT, 1, 0.8, marks=pytest.mark.slow),
-        pytest.param("processes", signal.SIGTERM, 1, 0.8, marks=pytest.mark.slow),
-    ],
+    ("executor", "sign", "kills", "longest"), [("threads", signal.SIGKILL, 1, 0.6), *MANY]
 )
 def test_killed_runs_resume_and_end_alike(tmp_path, uninterrupted, executor, sign, kills, longest):
     """And leave no process."""

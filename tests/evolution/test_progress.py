@@ -14,12 +14,9 @@ ENDED = replace(STATUS, evaluations=100, best_fitness=6.0, stop="levelled off")
 
 def test_a_line_is_about_all_trials_and_shows_the_fittest_gait():
     stream = io.StringIO()
-    for statuses in ([FRESH], [STATUS, ENDED, FRESH]):
-        Progress(stream).show(statuses)
-    first, second = stream.getvalue().splitlines()
-    assert first == "evaluations: 0 of 140"
-    for part in ("fitness 6.00", "5.00 in", "1 of 3 trials", "2 failed"):
-        assert part in second
+    Progress(stream).show([STATUS, ENDED, FRESH])
+    for part in ("140 of 380", "fitness 6.00", "5.00 in", "1 of 3 trials", "2 failed"):
+        assert part in stream.getvalue()
 
 
 def test_plain_lines_come_now_and_then_and_at_the_end_with_one_time_left(monkeypatch):
@@ -66,6 +63,4 @@ def test_a_terminal_shows_one_bar_for_the_run_and_one_per_stage(monkeypatch):
     with Progress(stream) as progress:
         progress.show([STATUS, ENDED, FRESH])
         progress.stage("best gaits", 2, 5)
-        progress.say("hello")
-    for text in ("hello", "140/380", "6.00", "best gaits", "2/5"):
-        assert text in stream.getvalue()
+    assert all(text in stream.getvalue() for text in ("140/380", "best gaits", "2/5"))

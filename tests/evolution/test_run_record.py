@@ -35,11 +35,11 @@ def test_the_manifest_holds_seed_versions_and_method_and_proves_the_scenario(tmp
 CHANGED = {"run": "x", "seed": 6, "versions": {}, "objective": "x", "optimizer": "CmaEs"}
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "named"),
-    [("schema", 3, "schema"), ("seed", -1, "seed"), ("versions", [], "versions")]
-    + [(key, value, "sha256") for key, value in CHANGED.items()],
-)
+NAMED = [("schema", 3, "schema"), ("seed", -1, "seed"), ("versions", [], "versions")]
+NAMED += [(key, value, "sha256") for key, value in CHANGED.items()]
+
+
+@pytest.mark.parametrize(("key", "value", "named"), NAMED)
 def test_a_damaged_or_changed_manifest_is_reported(tmp_path, refused, key, value, named):
     with create(tmp_path):
         pass

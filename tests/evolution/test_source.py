@@ -31,11 +31,6 @@ def test_the_gaits_of_a_run_and_files_in_it_come_with_its_scenario(run):
     assert given_gait(run, source.scenario) == given_gait(str(run), source.scenario) == source.best
 
 
-def test_a_folder_without_a_run_is_no_gait(tmp_path, refused):
-    with refused(tmp_path, "", "holds no manifest.json"):
-        given_gait(tmp_path, tiny_scenario())
-
-
 def test_another_scenario_than_the_gaits_is_said_once_with_both_names(run, tmp_path):
     other = tmp_path / "other.yaml"
     other.write_text(dump_scenario(tiny_scenario(name="other")))

@@ -8,9 +8,7 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Evaluation, Iteration
 
 
-def test_neither_workers_nor_executor_nor_timing_change_the_record(
-    run_small, tmp_path, one_process
-):
+def test_neither_workers_nor_timing_change_the_record(run_small, tmp_path, one_process):
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
     process = on_executor(Bowl(), one_process, 1)  # it is replaced on the way
@@ -22,10 +20,9 @@ def test_trials_differ_and_do_not_depend_on_their_number(run_small):
     two, three = (load_run(run_small(f"{n}", trials=n)).evaluations for n in (2, 3))
     other = load_run(run_small("other", trials=1, seed=6)).evaluations
     assert two.equals(three.query("trial < 2"))
-    first, second = (
-        two.query("trial == @trial")["weight 2->1 extensor"].tolist() for trial in (0, 1)
-    )
-    assert first not in (second, other["weight 2->1 extensor"].tolist())
+    tables = (two.query("trial == 0"), two.query("trial == 1"), other)
+    first, *others = (table["weight 2->1 extensor"].tolist() for table in tables)
+    assert first not in others
 
 
 @pytest.mark.parametrize("report", [{"mean_fitness": "wide"}, {"stop": 3}, {"spread": object}])

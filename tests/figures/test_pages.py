@@ -30,22 +30,16 @@ from tetra_drake.lab.comparison import compare, comparison
 from tetra_drake.lab.elites.elites import map_of_gaits
 from tetra_drake.study.robustness import robustness_figure
 
-OF_A_GAIT = (
-    *(gait_diagram, relative_distances, time_lapse, path_of_the_centre, one_step),
-    *(signals_and_tensions, ground_forces),
-)
+OF_A_GAIT = [gait_diagram, relative_distances, time_lapse, path_of_the_centre, one_step]
+OF_A_GAIT += [signals_and_tensions, ground_forces]
 NAME = "$rough-feedback, seed 0, trial 5, evaluation 3991"
 
 
 def with_long_names(robot):
     """A robot with names such as those of NTRT's structures."""
-    names = {
-        field: tuple(
-            f"front_right/{name}/leg/knee base_bottom/{name}/saddle t1-bottom"
-            for name in getattr(robot.structure, field)
-        )
-        for field in ("bodies", "node_names", "cable_names", "oscillators")
-    }
+    long, names = "front_right/{0}/leg/knee base_bottom/{0}/saddle t1-bottom", {}
+    for field in ("bodies", "node_names", "cable_names", "oscillators"):
+        names[field] = tuple(map(long.format, getattr(robot.structure, field)))
     return dataclasses.replace(robot, structure=dataclasses.replace(robot.structure, **names))
 
 

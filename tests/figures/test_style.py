@@ -1,10 +1,9 @@
 """The look that figures share, and how they are written."""
 
 import matplotlib
-import pytest
 from matplotlib.figure import Figure
 
-from tetra_drake.figures.style import Look, common_style, figure_function, page_of, save_figure
+from tetra_drake.figures.style import common_style, figure_function, page_of, save_figure
 
 
 @figure_function
@@ -54,9 +53,3 @@ def test_a_figure_is_drawn_on_a_figure_and_on_nothing_else(refused):
     assert drawn(figure=own.subfigures()) is None
     with refused("<lambda>", "figure", "Axes"):
         drawn(figure=own.subplots())
-
-
-@pytest.mark.parametrize(("width", "size"), [(0.0, 9.0), (1e6, 9.0), (2.0, 20.0), (7.0, 0.0)])
-def test_a_figure_without_room_is_refused(width, size, refused):
-    with refused("figure", "font_size", f"{size:g} points"):
-        Look(width, size)

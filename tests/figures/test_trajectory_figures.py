@@ -58,6 +58,10 @@ def pictures(figure):
     return [panel for panel in figure.axes if panel.get_aspect() == 1.0]
 
 
+def paths_of(figure):
+    return [panel for panel in figure.axes if panel.get_aspect() != 1.0]
+
+
 def test_stance_bars_show_when_feet_bear_load(walk):
     _, stance, speed = gait_diagram(row(walk)).axes
     start, end = last_step(walk)
@@ -67,8 +71,7 @@ def test_stance_bars_show_when_feet_bear_load(walk):
     expected = [f"T{i} {side}" for i in range(1, 6) for side in ("right", "left")]
     assert feet == expected, "the rear is below; the tip never stands"
     part = walk.sel(time=slice(*speed.get_xlim()))
-    rows = zip(feet, stance.collections, stance.get_yticks(), strict=True)
-    for foot, bars, row_of_foot in rows:
+    for foot, bars, row_of_foot in zip(feet, stance.collections, stance.get_yticks(), strict=True):
         corners = np.array([path.vertices[[0, 2]] for path in bars.get_paths()])
         np.testing.assert_allclose(corners[..., 1].mean(axis=1), row_of_foot)
         load = part.normal_force.sel(contact=foot.replace(" ", " bottom_"))
@@ -99,6 +102,10 @@ def test_the_time_lapse_shows_instants_from_start_to_end(walk):
 
 
 def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):
+    # Of a straight path the height is shown.
+    [panel] = path_of_the_centre(row(walk), units="SI").axes
+    centre = walk.p_WB.mean("body")
+    np.testing.assert_allclose(panel.lines[0].get_xydata(), centre.sel(axis=["x", "z"]))
     # All bodies go along a circle at SPEED and turn with it.
     radius = 0.05
     angle = SPEED * walk.time.values / radius
@@ -117,17 +124,6 @@ def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):
     headings = np.arctan2(arrows.V, arrows.U)
     np.testing.assert_allclose(headings, angle[[0, 300, 600, 900]], atol=1e-9)
     np.testing.assert_allclose(arrows.XY, path.get_xydata()[[0, 300, 600, 900]])
-
-
-def test_of_a_straight_path_the_height_is_shown(walk):
-    [panel] = path_of_the_centre(row(walk), units="SI").axes
-    [path] = panel.lines
-    centre = walk.p_WB.mean("body")
-    np.testing.assert_allclose(path.get_xydata(), centre.sel(axis=["x", "z"]))
-
-
-def paths_of(figure):
-    return [panel for panel in figure.axes if panel.get_aspect() != 1.0]
 
 
 def test_one_step_has_tetrahedra_off_the_ground_in_red_and_paths_of_bottom_nodes(walk):

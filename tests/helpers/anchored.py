@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 from typing import Any
+
+import yaml
 
 from helpers.converged import shortly
 from helpers.structures import SIDES_ALONE
@@ -14,27 +17,12 @@ from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure
 
-BAR: dict[str, Any] = {"pairs": [["a", "b"]], "diameter": 0.008, "density": 1200.0}
-BAR |= {"node_diameter": 0.0, "contact_radius": 0.0}
-LINE = {"pairs": [["top", "a"]], "stiffness": 200.0, "damping": 0.0, "free_length": 0.4}
-
-HUNG: dict[str, Any] = {
-    "nodes": {"top": [0.0, 0.0, 1.0], "a": [0.0, 0.0, 0.58], "b": [0.0, 0.0, 0.38]},
-    "struts": {"bar": BAR},
-    "cables": {"line": LINE},
-    "masses": {"a": 0.2, "b": 0.3},
-    "anchors": {"top": "xyz"},
-}
-"""An upright bar with a mass at each end that hangs by a cable."""
-
-SWINGING: dict[str, Any] = {
-    "nodes": {"a": [0.0, 0.0, 0.0], "b": [0.0, 0.0, -0.4]},
-    "struts": {"bar": BAR},
-    "masses": {"b": 0.05},
-    "anchors": {"a": "xyz"},
-    "anchor_stiffness": 1e6,
-}
-"""A bar whose upper node is held."""
+TREES: dict[str, dict[str, Any]] = yaml.safe_load(
+    Path(__file__).with_name("trees.yaml").read_text("utf-8")
+)
+"""Structures by name; the file says what they are."""
+HUNG, SWINGING = TREES["hung"], TREES["swinging"]
+BAR, LINE = HUNG["struts"]["bar"], HUNG["cables"]["line"]
 
 SUPPORTS = {"n0": "xyz", "n1": "yz", "n2": "z"}
 """Anchors of the prism: as many as it takes to hold a rigid body."""

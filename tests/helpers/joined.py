@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from helpers.anchored import BAR, scenario_of, supported_prism
+from helpers.anchored import BAR, TREES, scenario_of, supported_prism
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
@@ -16,73 +15,10 @@ G = 9.80665
 HEAVY, LIGHT, STIFFNESS, REACH = 0.2, 0.1, 1e3, 0.2
 EXACT = {"rtol": 1e-10, "atol": 1e-12}
 
-ROPE = {"stiffness": STIFFNESS, "damping": 0.0}
-ATWOOD: dict[str, Any] = {
-    "nodes": {"a": [-0.1, 0, 0.5], "r": [-0.1, 0, 1], "s": [0.1, 0, 1], "b": [0.1, 0, 0.5]},
-    "cables": {"rope": ROPE | {"pairs": [["a", "r", "s", "b"]], "tension": LIGHT * G}},
-    "masses": {"a": HEAVY, "b": LIGHT},
-    "anchors": {"r": "xyz", "s": "xyz"},
-    "loads": {"a": [0.0, 0.0, (HEAVY - LIGHT) * G]},
-}
-"""A heavy and a light mass on a cable over two rings, held in balance by a load."""
-
-STRING: dict[str, Any] = {
-    "nodes": {"a": [-REACH, 0, 1], "p": [0, 0, 1], "b": [REACH, 0, 1]},
-    "cables": {"string": ROPE | {"pairs": [["a", "p", "b"]], "free_length": 0.38}},
-    "masses": {"p": LIGHT},
-    "anchors": {"a": "xyz", "b": "xyz"},
-    "gravity": 0.0,
-}
-"""A bead on a string between two walls."""
-
-STIFF = {"stiffness": 1e6, "time_constant": 1e-3}
 UPPER, LOWER = 0.4, 0.3
-DOUBLE: dict[str, Any] = {
-    "nodes": {
-        "a": [0, 0, 0],
-        "b": [0, 0, -UPPER],
-        "c": [0, 0, -UPPER],
-        "d": [0, 0, -UPPER - LOWER],
-    },
-    "struts": {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}},
-    "joints": {"knee": STIFF | {"nodes": ["b", "c"]}},
-    "anchors": {"a": "xyz"},
-    "anchor_stiffness": 1e6,
-}
-"""Two bars that hang one below the other."""
-
-HINGED: dict[str, Any] = {
-    "nodes": {
-        "a": [0, -0.2, 1],
-        "b": [0, 0.2, 1],
-        "c": [0, -0.2, 1],
-        "d": [0, 0.2, 1],
-        "e": [0, 0, 0.7],
-    },
-    "struts": {
-        "post": BAR | {"pairs": [["a", "b"]]},
-        "flap": BAR | {"pairs": [["c", "d"], ["c", "e"], ["d", "e"]]},
-    },
-    "joints": {"left": STIFF | {"nodes": ["a", "c"]}, "right": STIFF | {"nodes": ["b", "d"]}},
-    "anchors": {"a": "xyz", "b": "xyz"},
-    "anchor_stiffness": 1e6,
-}
-"""A triangle that hangs from a fixed bar on a hinge of two joints."""
-
-
-RHOMBUS: dict[str, Any] = {
-    "nodes": {"l": [-1, 0, 0.5], "r": [1, 0, 0.5], "u": [0, 0.6, 0.5], "d": [0, -0.6, 0.5]},
-    "struts": {"bar": BAR | {"pairs": [["l", "u"], ["u", "r"], ["r", "d"], ["d", "l"]]}},
-    "pinned": ["l", "r", "u", "d"],
-    "anchors": dict.fromkeys("lrud", "z"),
-    "cables": {
-        "long": {"pairs": [["l", "r"]], "stiffness": 1e3, "damping": 5.0, "tension": 100.0},
-        "cross": {"pairs": [["u", "d"]], "stiffness": 1e3, "damping": 5.0, "tension": 60.0},
-    },
-    "gravity": 0.0,
-}
-"""Four bars that are pinned to a rhombus, with a cable along each diagonal. Without the anchors it
-would fold out of its plane."""
+ATWOOD, STRING, DOUBLE, HINGED, RHOMBUS = (
+    TREES[name] for name in ("atwood", "string", "double", "hinged", "rhombus")
+)
 
 
 def with_arm(**changes: object) -> Scenario:

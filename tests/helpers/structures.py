@@ -46,7 +46,7 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
 def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:
     """Result and motion of a robot that walks by a seeded gait on the compiled engine."""
     walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, seed))
-    batch = LaneBatch([walk], places=1, record=True, threads=1)
+    batch = LaneBatch(walk, record=True)
     batch.advance()
     return batch.result(0), batch.motion(0)
 

@@ -147,9 +147,7 @@ def cluster_of_a_thread(workers):
 @pytest.mark.parametrize(
     "make", [cluster_of_a_thread, pytest.param(local_cluster, marks=pytest.mark.slow)]
 )
-def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(
-    make, tmp_path, monkeypatch, capsys
-):
+def test_the_command_starts_a_cluster_or_says_why_not(make, tmp_path, monkeypatch, capsys):
     made = Mock(wraps=make)
     monkeypatch.setattr("tetra_drake.lab.cluster.local_cluster", made)
 

@@ -5,9 +5,6 @@ import math
 import pytest
 
 import tetra_drake as td
-from tetra_drake.errors import InputError
-
-TWISTED = td.load_scenario("prism").with_changes({"robot.nodes.n3": ["9 cm", "4 cm", "16 cm"]})
 
 
 def at_rest_without_weight(scenario):
@@ -31,23 +28,12 @@ def test_without_weight_the_found_structure_rests_where_its_file_has_it():
     assert study.cables["tension"].to_numpy() == pytest.approx(9.0, rel=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("scenario", "prestress", "problem"),
-    [
-        ("thesis", {"outer": "1 N"}, "found a row of tetrahedra"),
-        ("prism", {"sides": "9 N"}, "did you mean 'side'"),
-        ("prism", {"side": "9 m"}, "'9 m', expected a quantity that converts to N"),
-        ("prism", {}, "found 0 independent tensions, expected 1"),
-        ("prism", {"side": "9 N", "top": "1 N"}, "not in balance"),
-        ("prism", {"side": "-1 N"}, "side would push with 1 N"),
-        (
-            "prism",
-            {"side": "1 kN"},
-            "'side n0 n3' 1000 N, .* 0 at 16.82 N; expected 1.68 % of it",
-        ),
-        (TWISTED, {"side": "9 N"}, "no state of self-stress"),
-    ],
-)
-def test_a_wrong_prestress_is_told_in_one_line(scenario, prestress, problem):
-    with pytest.raises(InputError, match=problem):
-        td.form_find(scenario, prestress)
+def test_a_group_may_be_without_tension():
+    pairs = [["n0", "n5"], ["n1", "n3"], ["n2", "n4"]]
+    idle = {"pairs": pairs, "stiffness": "100 N/m", "damping": "1 N*s/m", "tension": "1 N"}
+    crossed = td.load_scenario("prism").with_changes({"robot.cables.idle": idle})
+    found = td.form_find(crossed, {"side": "9 N", "idle": "0 N"})
+    tensions = {name: group.tension for name, group in found.robot.cables.items()}
+    assert tensions["idle"] == pytest.approx(0.0, abs=1e-9)
+    own = td.form_find("prism", {"side": "9 N"}).robot.cables
+    assert tensions["top"] == pytest.approx(own["top"].tension)

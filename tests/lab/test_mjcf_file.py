@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from helpers.anchored import supported_prism
+from helpers.files import DATA
 from pytest import approx
 
 from tetra_drake.cli import main
@@ -22,71 +24,8 @@ from tetra_drake.study.equilibrium import robot_of_file, robot_of_structure
 
 mujoco = pytest.importorskip("mujoco")
 
-# A plate with a given inertia hangs by a ring on a cable, and a leg by a joint on the plate.
-HANGING = """
-unit: m
-nodes: {left: [-0.3, 0, 1], right: [0.3, 0, 1], side: [-0.4, 0.1, 0.2], ring: [0, 0, 0.8],
-        end: [0.1, 0, 0.7], float: [-0.1, 0, 0.7], hinge: [0.1, 0, 0.7], low: [0.1, 0, 0.4]}
-struts:
-  arm: {pairs: [[ring, end]], diameter: 1 cm, node_diameter: 0 m, density: 1 g/cm^3}
-  leg: {pairs: [[hinge, low]], diameter: 1 cm, node_diameter: 3 cm, density: 1 g/cm^3}
-cables:
-  loop: {pairs: [[left, ring, right]], stiffness: 500 N/m, damping: 1 N*s/m, free_length: 0.7 m}
-  stay: {pairs: [[low, side], [left, float], [right, end]], stiffness: 200 N/m, damping: 0 N*s/m,
-         free_length: 0.3 m}
-joints: {knee: {nodes: [end, hinge], stiffness: 1e9 N/m}}
-bodies:
-  plate: {struts: [arm], nodes: [float], mass: 0.8 kg, centre: [0.01, 0.02, 0.75],
-          inertia: [4 kg*m^2, 5 kg*m^2, 6 kg*m^2, 0.5 kg*m^2, 0 kg*m^2, -0.2 kg*m^2]}
-anchors: {left: xyz, right: xyz, side: xyz}
-actuated: {pull: [loop left ring right], both: [stay low side, stay left float]}
-"""
-
-# A rod stands on a floor at z = -1 and hangs on a box that the world holds by a hinge.
-OTHERS = """<mujoco><option gravity="1 0 -5"/><worldbody>
-  <geom name="floor" type="plane" size="9 9 1" pos="0 0 -1"/>
-  <geom name="wall" size="1" pos="9 9 9"/>
-  <site name="top left" pos="0 0 3"/>
-  <body name="box" pos="0 0 4"><joint name="door"/><geom size="0.1"/><site name="b.x"/></body>
-  <body name="rod" pos="0 0 1"><freejoint/><site name="high" pos="0 0 1"/>
-    <site name="arm" pos="0.2 0 0"/>
-    <geom name="bar 1" type="capsule" size="0.1" fromto="0 0 -1 0 0 1" mass="2" contype="0"
-      conaffinity="0"/>
-    <body pos="0 0 -1"><geom name="ball" size="0.25" mass="1"/><site name="foot"/></body></body>
-</worldbody><tendon>
-  <spatial name="t1" stiffness="10" springlength="0 0.5" limited="true" range="0 9">
-    <site site="high"/><site site="top left"/></spatial>
-  <spatial name="t2"><site site="arm"/><site site="b.x"/></spatial>
-  <spatial name="t3" stiffness="7"><site site="foot"/><site site="high"/></spatial>
-  <spatial name="t4"><site site="foot"/><site site="b.x"/></spatial>
-</tendon><actuator>
-  <general name="wind 1" tendon="t2" gainprm="80" biastype="affine" biasprm="40 -80 -2" gear="0.5"/>
-  <muscle name="flex" tendon="t1" lengthrange="1 2"/>
-</actuator></mujoco>"""
-
-
-LOOSE = OTHERS.replace("stiffness", "damping").replace("biasprm", "user")
-LOOSE = LOOSE.replace('limited="true" range="0 9"', "")
-ATTACHES = """<mujoco><asset><model name="x" file="{}"/></asset>
-  <worldbody><attach model="x" prefix="p"/></worldbody></mujoco>"""
-
-
-# A ball on a tether, with settings, and with the places of its sphere and of its node.
-TETHERED = """<mujoco>{}<worldbody><site name="o"/><body pos="0 0 1"><freejoint/>
-  <geom size="0.1" {}/><site name="a" pos="{}"/></body></worldbody><tendon>
-  <spatial stiffness="9" springlength="0 1"><site site="o"/><site site="a"/></spatial></tendon>
-</mujoco>"""
-
-
-# A ball on a rope and on a guy, with an option, a joint, attributes of the rope, and more.
-BALL = """<mujoco><option timestep="0.001">{option}</option><worldbody>
-  <site name="top" pos="0 0 2"/><site name="side" pos="0.8 0.1 1.4"/>
-  <body name="ball" pos="0 0 1.2" {body}>{joint}
-    <geom size="0.05" mass="1"/><site name="eye"/></body>
-</worldbody><tendon>
-  <spatial name="rope" {rope}><site site="top"/><site site="eye"/></spatial>
-  <spatial stiffness="60" springlength="0 0.5"><site site="side"/><site site="eye"/></spatial>
-</tendon>{more}</mujoco>"""
+TEXTS = {file.stem: file.read_text("utf-8") for file in (DATA / "mjcf").glob("*.xml")}
+ROWS = yaml.safe_load(Path(__file__).with_name("mjcf.yaml").read_text("utf-8"))
 SPRING = 'stiffness="100" springlength="0 0.6" damping="2"'
 FREE = '<joint name="root" type="free" {}/>'
 
@@ -94,12 +33,8 @@ FREE = '<joint name="root" type="free" {}/>'
 def ball(tmp_path: Path, **parts: str) -> Path:
     """File with the ball, and parts of it."""
     given = dict(option="", body="", joint="<freejoint/>", rope=SPRING, more="") | parts
-    (tmp_path / "ball.xml").write_text(BALL.format(**given))
+    (tmp_path / "ball.xml").write_text(TEXTS["ball"].format(**given))
     return tmp_path / "ball.xml"
-
-
-def on_rope(actuator: str) -> str:
-    return f'<actuator><{actuator} name="pull" tendon="rope"/></actuator>'
 
 
 def left_at_rest(file: Path) -> np.ndarray:
@@ -108,9 +43,8 @@ def left_at_rest(file: Path) -> np.ndarray:
     structure = robot_of_structure(converted(file), str(file)).structure
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
-    bounds = (
-        model.actuator_actrange if model.actuator_actlimited.any() else model.actuator_ctrlrange
-    )
+    acts = model.actuator_actlimited.any()
+    bounds = model.actuator_actrange if acts else model.actuator_ctrlrange
     data.act[:] = np.clip(0.0, *bounds.T)[: model.na]
     eye = structure.node_names.index("eye")
     data.qpos[:3] = structure.p_WB[0] + structure.p_BN[eye]
@@ -137,10 +71,9 @@ def driven_by(robot: Robot) -> dict[str, set[frozenset[str]]]:
     return {oscillator: {names[cable] for cable in group} for oscillator, group in groups}
 
 
-@pytest.mark.parametrize("name", [*shipped_structures(), "hanging.yaml"])
+@pytest.mark.parametrize("name", [*shipped_structures(), str(DATA / "structures/hanging.yaml")])
 def test_a_robot_is_the_same_after_a_way_to_mujoco_and_back(name: str, tmp_path: Path) -> None:
-    (tmp_path / "hanging.yaml").write_text(HANGING)
-    robot = robot_of_file(name if name in shipped_structures() else str(tmp_path / name))
+    robot = robot_of_file(name)
     file, model = tmp_path / "robot.xml", model_of(robot)
     file.write_text(make_mjcf(robot))
     structure = converted(file)
@@ -168,7 +101,7 @@ def test_a_robot_is_the_same_after_a_way_to_mujoco_and_back(name: str, tmp_path:
 
 
 def test_what_a_file_of_others_says(tmp_path: Path) -> None:
-    (tmp_path / "a.xml").write_text(OTHERS)
+    (tmp_path / "a.xml").write_text(TEXTS["others"])
     structure = converted(tmp_path / "a.xml")
     assert structure.nodes["foot"] == approx([0, 0, 1])  # above the floor
     assert structure.anchors == {"top_left": "xyz", "b_x": "xyz"}
@@ -182,49 +115,12 @@ def test_what_a_file_of_others_says(tmp_path: Path) -> None:
     assert [t2.stiffness, t2.damping] == [approx(20), approx(0.5)]
     assert structure.actuated == {"wind_1": ["t-2 arm b_x"]}
     told = "\n".join(structure.ignored or [])
-    for name in (
-        "door",
-        "wall",
-        "t3",
-        "t4",
-        "flex",
-        "'limited' of tendons, left out: t1",
-        "1 0 -5",
-    ):
-        assert name in told
+    words = ("door", "wall", "t3", "t4", "flex", "'limited' of tendons, left out: t1", "1 0 -5")
+    assert all(word in told for word in words)
     assert "t2" not in told
 
 
-@pytest.mark.parametrize(
-    "parts",
-    [
-        {"body": 'gravcomp="0.4"'},
-        {"body": 'gravcomp="0.4"', "joint": FREE.format('actuatorgravcomp="true"')},
-        {"rope": "", "more": on_rope('position kp="500" ctrlrange="0.5 0.9"')},
-        {"rope": "", "more": on_rope('position kp="500" ctrlrange="0.5 0.9" timeconst="0.1"')},
-        {"rope": "", "more": on_rope('intvelocity kp="500" ctrlrange="-1 1" actrange="0.5 0.9"')},
-        {"more": on_rope('motor ctrlrange="-9 -3" gear="2"')},
-        {"more": on_rope('motor forcerange="-9 -3" gear="2"')},
-        {
-            "rope": "",
-            "more": on_rope('general gaintype="affine" gainprm="1 -9 -1" ctrlrange="2 3"'),
-        },
-        {
-            "option": '<flag spring="disable"/>',
-            "more": on_rope('position kp="80" ctrlrange="0.5 0.9"'),
-        },
-        {
-            "option": '<flag actuation="disable"/>',
-            "more": on_rope('position kp="80" ctrlrange="0.5 0.9"'),
-        },
-        {"option": '<flag limit="disable"/>', "rope": f'{SPRING} range="0 0.5"'},
-        {
-            "more": '<actuator><motor site="eye" refsite="side" gear="1 2 3 0 0 0" '
-            'ctrlrange="1 3"/><general site="eye" refsite="top" gear="0 0 1 0 0 0" '
-            'biastype="affine" biasprm="1 -40 -2"/></actuator>'
-        },
-    ],
-)
+@pytest.mark.parametrize("parts", ROWS["rests"])
 def test_a_robot_rests_where_it_rests_in_mujoco_at_control_0(parts, tmp_path: Path) -> None:
     assert left_at_rest(ball(tmp_path, **parts)) == approx([0.0, 0.0, 0.0], abs=1e-4)
 
@@ -279,17 +175,11 @@ def test_anchors_and_loads_come_back(tmp_path: Path) -> None:
     assert structure.ignored is None
 
 
-GHOST = """<body name="ghost" pos="0 0 1"><freejoint/><geom size="0.01" mass="1e-9"/>
-  <site name="g"/></body><body name="aim" mocap="true" pos="0 0 1"/>"""
-REFERS = """<equality><weld body1="ghost" body2="aim"/></equality><sensor><framepos
-  objtype="body" objname="ghost"/></sensor><keyframe><key time="1"/></keyframe>"""
-LEASH = '<spatial stiffness="1"><site site="g"/><site site="eye"/></spatial></tendon>'
-
-
-def test_a_body_is_left_out_by_name(tmp_path: Path, refused) -> None:
-    file = ball(tmp_path, more=REFERS)
-    text = file.read_text().replace("</worldbody>", f"{GHOST}</worldbody>")
-    file.write_text(text.replace("</tendon>", LEASH))
+def test_a_body_is_left_out_by_name(tmp_path: Path, refused, capsys) -> None:
+    ghost = ROWS["ghost"]
+    file = ball(tmp_path, more=ghost["refers"])
+    text = file.read_text().replace("</worldbody>", f"{ghost['body']}</worldbody>")
+    file.write_text(text.replace("</tendon>", f"{ghost['leash']}</tendon>"))
     assert "g" in converted(file).nodes
     structure = converted(file, without=["ghost", "aim"])
     assert [*structure.nodes] == ["top", "side", "eye"]
@@ -300,6 +190,8 @@ def test_a_body_is_left_out_by_name(tmp_path: Path, refused) -> None:
     made = tmp_path / "a.yaml"
     assert main(["structure", str(file), "--without", "ghost", "aim", "--out", str(made)]) == 0
     assert read_structure(made).nodes == structure.nodes
+    assert "a: 1 body, 3 nodes, 2 cables" in capsys.readouterr().out
+    assert made.read_text().startswith("# Converted from ball.xml by tetra-drake.\nformat: 1\n")
 
 
 def test_a_scenario_and_other_commands_tell_how_to_convert_a_file(tmp_path: Path, refused) -> None:
@@ -313,52 +205,34 @@ def test_a_scenario_and_other_commands_tell_how_to_convert_a_file(tmp_path: Path
 
 def test_a_file_of_an_earlier_mujoco_means_the_same(tmp_path: Path) -> None:
     settings = '<compiler coordinate="global"/><option><flag sensornoise="disable"/></option>'
-    old = TETHERED.format(settings, 'pos="0 0 1"', "0.1 0 1")
+    old = TEXTS["tethered"].format(settings, 'pos="0 0 1"', "0.1 0 1")
     (tmp_path / "part").write_text(old)
     (tmp_path / "old.xml").write_text('<mujoco><include file="part"/></mujoco>')
-    (tmp_path / "new.xml").write_text(TETHERED.format("", "", "0.1 0 0"))
+    (tmp_path / "new.xml").write_text(TEXTS["tethered"].format("", "", "0.1 0 0"))
     included, new = (converted(tmp_path / f"{name}.xml") for name in ("old", "new"))
     assert new.blueprint().p_WN.tolist() == [[0.1, 0, 1], [0, 0, 0]]
     assert [included.nodes, included.bodies] == [new.nodes, new.bodies]
     assert "sensornoise" in str(included.ignored)
 
 
-def test_the_command_writes_a_structure_file(tmp_path: Path, capsys) -> None:
-    file = tmp_path / "prism.xml"
-    file.write_text(make_mjcf(robot_of_file("prism")))
-    assert main(["structure", str(file), "--out", str(tmp_path / "mine.yaml")]) == 0
-    assert "mine: 3 bodies, 6 nodes, 9 cables, 6 oscillators, 60.83 g" in capsys.readouterr().out
-    text = (tmp_path / "mine.yaml").read_text()
-    assert text.startswith("# Converted from prism.xml by tetra-drake.\nformat: 1\nnodes:\n")
-
-
 def test_without_mujoco_the_error_says_how_to_install_it(monkeypatch, tmp_path, refused) -> None:
-    (tmp_path / "a.xml").write_text(OTHERS)
+    (tmp_path / "a.xml").write_text(TEXTS["others"])
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with refused(tmp_path / "a.xml", "", "pip install"):
         converted(tmp_path / "a.xml")
 
 
-@pytest.mark.parametrize(
-    ("text", "key", "fact"),
-    [
-        ("<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco>&b;</mujoco>", "", "document type"),
-        ("<mujoco", "", "is not XML"),
-        ("<foo/>", "", "mujoco refuses the file"),
-        ("<mujoco><nix/></mujoco>", "", "mujoco refuses the file"),
-        ("<mujoco/>", "tendon", "no spatial tendon"),
-        (LOOSE, "tendon", "without stiffness or limit, left out: t1, t2, t4"),
-        (LOOSE.replace("t4", "t4" * 99), "tendon", "to itself, left out: t3"),
-        (f"<mujoco><worldbody><body><{'nix' * 99}/></body></worldbody></mujoco>", "", "line 1"),
-        (
-            '<mujoco><asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
-            "",
-            "",
-        ),
-        (ATTACHES.format("a.xml"), "include", "twice"),
-    ],
-)
+@pytest.mark.parametrize(("text", "key", "fact"), ROWS["refused"])
 def test_other_files_are_refused_in_one_line(text, key, fact, tmp_path, refused) -> None:
     (tmp_path / "a.xml").write_text(text)
     with refused(tmp_path / "a.xml", key, fact):
         converted(tmp_path / "a.xml")
+
+
+def test_what_loose_tendons_are_called_is_told(tmp_path, refused) -> None:
+    text = TEXTS["others"].replace("stiffness", "damping").replace("biasprm", "user")
+    text = text.replace('limited="true" range="0 9"', "")
+    for t4, fact in (("t4", "limit, left out: t1, t2, t4"), ("t4" * 99, "itself, left out: t3")):
+        (tmp_path / "a.xml").write_text(text.replace("t4", t4))
+        with refused(tmp_path / "a.xml", "tendon", fact):
+            converted(tmp_path / "a.xml")

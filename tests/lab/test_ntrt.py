@@ -2,10 +2,13 @@
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from helpers.files import DATA
 from helpers.structures import joined_nodes
 
 from tetra_drake.errors import InputError
@@ -17,47 +20,14 @@ from tetra_drake.scenario.load import load_scenario, save_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.study.equilibrium import robot_of_structure
 
-# Height 2, radius 1, the upper triangle twisted by 30 deg about the vertical, which is y.
-PRISM = """
-nodes:
-  low1: [1, 0, 0]
-  low2: [-0.5, 0, -0.8660254037844386]
-  low3: [-0.5, 0, 0.8660254037844386]
-  high1: [0.8660254037844386, 2, -0.5]
-  high2: [-0.8660254037844386, 2, -0.5]
-  high3: [0, 2, 1]
-pair_groups:
-  prism_rod: [[low1, high2], [low2, high3], [low3, high1]]
-  horizontal string:
-    [[low1, low2], [low2, low3], [low3, low1], [high1, high2], [high2, high3], [high3, high1]]
-  vertical string: [[low1, high1], [low2, high2], [low3, high3]]
-builders:
-  prism_rod:
-    class: tgRodInfo
-    parameters: {density: 0.5, radius: 0.25, friction: 0.9, restitution: 0}
-  vertical:
-    class: tgKinematicActuatorInfo
-    parameters: {stiffness: 800, damping: 5, pretension: 1200, radius: 2, history: true}
-"""
-
-VERTEBRA = """
-nodes:
-  {middle: [0, 1, 0], front: [1, 2, 1], right: [1, 0, -1], back: [-1, 2, -1], left: [-1, 0, 1]}
-pair_groups:
-  rod: [[middle, front], [middle, right], [middle, back], [middle, left]]
-"""
-
-SPINE = """
-substructures:
-  v1/v2/v3: {path: vertebra.yaml, offset: [0, 0, 1.5]}
-  v2: {rotation: {axis: [0, 1, 0], angle: 180}}
-bond_groups:
-  string:
-    v1/v2/v3/node_node: [[front, front], [right, right], [back, back], [left, left]]
-"""
+TEXTS = {file.stem: file.read_text("utf-8") for file in (DATA / "ntrt").glob("*.yaml")}
+ROWS = yaml.safe_load(Path(__file__).with_name("ntrt.yaml").read_text("utf-8"))
 
 
 def write(folder: Path, text: str, name: str = "my.yaml") -> Path:
+    """A file, beside the examples."""
+    if not any(folder.iterdir()):
+        shutil.copytree(DATA / "ntrt", folder, dirs_exist_ok=True)
     (folder / name).write_text(text)
     return folder / name
 
@@ -66,8 +36,8 @@ def read(file: Path, unit: float = 0.1) -> StructureFile:
     return StructureFile.from_tree(ntrt_tree(file, unit=unit), file)
 
 
-def test_a_prism_in_decimetres(tmp_path: Path) -> None:
-    given = read(write(tmp_path, PRISM))
+def test_a_prism_in_decimetres() -> None:
+    given = read(DATA / "ntrt/prism.yaml")
     rod, side = given.struts["prism_rod"], given.cables["vertical/string"]
     assert (rod.diameter, rod.density, rod.node_diameter) == pytest.approx((0.05, 500.0, 0.0))
     assert (side.stiffness, side.damping, side.tension) == pytest.approx((800.0, 5.0, 120.0))
@@ -80,9 +50,8 @@ def test_a_prism_in_decimetres(tmp_path: Path) -> None:
     assert (len(statics.self_stresses), statics.mechanisms) == (1, 1)
 
 
-def test_a_spine_by_substructures(tmp_path: Path) -> None:
-    write(tmp_path, VERTEBRA, "vertebra.yaml")
-    given = read(write(tmp_path, SPINE))
+def test_a_spine_by_substructures() -> None:
+    given = read(DATA / "ntrt/spine.yaml")
     blueprint = given.blueprint()
     assert blueprint.bodies == ("v1", "v2", "v3")
     rod = given.struts["rod"]  # by the default builder
@@ -95,33 +64,16 @@ def test_a_spine_by_substructures(tmp_path: Path) -> None:
     assert blueprint.cable_names[:5:4] == first_cables
 
 
-BALL = """
-nodes: {low: [0, 1, 0], high: [0, 11, 0], ball: [0, 11, 0]}
-pair_groups: {rod: [[low, high]]}
-builders:
-  rod: {class: tgRodInfo, parameters: {density: 0.5, radius: 0.25}}
-  ball: {class: tgSphereInfo, parameters: {density: 0.7, radius: 2, friction: 1}}
-"""
-
-
-def test_a_sphere_at_the_end_of_a_rod(tmp_path: Path) -> None:
-    blueprint = read(write(tmp_path, BALL)).blueprint()
+def test_a_sphere_at_the_end_of_a_rod() -> None:
+    blueprint = read(DATA / "ntrt/ball.yaml").blueprint()
     radii = dict(zip(blueprint.node_names, blueprint.node_radius.tolist(), strict=True))
     assert radii == pytest.approx({"low": 0.0, "high": 0.2}), "its node is where a rod ends"
     rod, ball = 0.5 * math.pi * 0.25**2 * 10.0, 0.7 * 4.0 / 3.0 * math.pi * 2.0**3  # kg
     assert Structure.of(blueprint).mass == pytest.approx([rod + ball])
 
 
-DOCKED = """
-substructures: {a/b: {path: prism.yaml}}
-bond_groups:
-  string: {a/b/node_edge: [[high1, low1/low2], [high2, low2/low3], [high3, low3/low1]]}
-"""
-
-
-def test_a_bond_of_nodes_and_edges_moves_the_second_part_and_replaces_cables(tmp_path):
-    write(tmp_path, PRISM, "prism.yaml")
-    given = read(write(tmp_path, DOCKED))
+def test_a_bond_of_nodes_and_edges_moves_the_second_part_and_replaces_cables():
+    given = read(DATA / "ntrt/docked.yaml")
     p = {name: np.array(place) for name, place in given.nodes.items()}
     centre = (p["a/high1"] + p["a/high2"] + p["a/high3"]) / 3.0
     for i, j in ((1, 2), (2, 3), (3, 1)):  # the triangles have one size, their middles half of it
@@ -134,21 +86,8 @@ def test_a_bond_of_nodes_and_edges_moves_the_second_part_and_replaces_cables(tmp
     assert {"b/low1", "b/low2"} not in pairs and {"a/high1", "a/high2"} not in pairs
 
 
-KINDS = """
-nodes: {u: [0, 12, 0], v: [0, 12, 4], a: [0, 9, 0], b: [0, 9, 4], w: [0, 5, 2], spare: [9, -3, 9]}
-pair_groups:
-  ceiling: [[u, v]]
-  bar: [[a, b]]
-  string: [[u, a], [v, b], [a, w], [b, w], [u, v], [a, b]]
-builders:
-  ceiling: {class: tgRodInfo, parameters: {density: 0}}
-  bar: {class: tgBoxInfo, parameters: {density: 0.7, width: 0.2, height: 0.1}}
-  w: {class: tgSphereInfo, parameters: {density: 3, radius: 1.5}}
-"""
-
-
-def test_boxes_spheres_on_cables_bodies_held_in_space_and_names_of_places(tmp_path, caplog):
-    given = read(write(tmp_path, KINDS))
+def test_boxes_spheres_on_cables_bodies_held_in_space_and_names_of_places(caplog):
+    given = read(DATA / "ntrt/kinds.yaml")
     assert given.anchors == {"u": "xyz", "v": "xyz"}, "of density 0"
     assert given.nodes["u"][2] == pytest.approx(1.2), "where something is held, y = 0 is the ground"
     blueprint = given.blueprint()
@@ -162,30 +101,16 @@ def test_boxes_spheres_on_cables_bodies_held_in_space_and_names_of_places(tmp_pa
 
 def test_of_several_builders_the_last_counts_and_bonds_have_the_names_of_their_parts(tmp_path):
     string = "{class: tgBasicActuatorInfo, parameters: {stiffness: 3}}"
-    given = read(write(tmp_path, f"{PRISM}  string: {string}"))
+    given = read(write(tmp_path, f"{TEXTS['prism']}  string: {string}"))
     assert given.cables["vertical/string"].stiffness == 3.0
-    write(tmp_path, VERTEBRA, "vertebra.yaml")
-    given = read(write(tmp_path, f"{SPINE}builders: {{string v1/v2: {string}}}"))
+    given = read(write(tmp_path, f"{TEXTS['spine']}builders: {{string v1/v2: {string}}}"))
     assert sorted(group.stiffness for group in given.cables.values()) == [3.0, 1000.0]
 
 
-ROD, EDGES = "pair_groups.prism_rod", "bond_groups.string.v1/v2/v3/node_edge"
-QUARTER = "rotation: {axis: [0, 1, 0], angle: 90}"
-
-
-PLACES = [
-    ("rotation: {axis: [0, 5e-324, 0], angle: 90}", [1, 2, -1], 0),
-    ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1], -2),
-    (f"scale: 3, translation: [1, 0, 0], {QUARTER}", [4, 4, -3], -2),
-    ("offset: [5, 5, 5]", [1, 2, 1], 0),
-]
-
-
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(("entry", "front", "lowest"), PLACES)
+@pytest.mark.parametrize(("entry", "front", "lowest"), ROWS["places"])
 def test_places_of_substructures(entry, front, lowest, tmp_path) -> None:
     """Turned, then scaled about their centre, then moved; then the whole is set on the ground."""
-    write(tmp_path, VERTEBRA, "vertebra.yaml")
     file = write(tmp_path, f"substructures: {{v: {{path: vertebra.yaml, {entry}}}}}")
     x, y, z = front
     assert read(file, unit=1.0).nodes["v/front"] == pytest.approx([z, x, y - lowest])
@@ -193,56 +118,29 @@ def test_places_of_substructures(entry, front, lowest, tmp_path) -> None:
 
 def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> None:
     """A superstructure overrides builders; a name means the least nested node that has it."""
-    write(tmp_path, VERTEBRA, "vertebra.yaml")
-    spine = SPINE + "builders: {string: {class: tgBasicActuatorInfo, parameters: {stiffness: 7}}}"
-    write(tmp_path, spine, "spine.yaml")
-    text = """
-        substructures:
-          a: {path: spine.yaml}
-          b: {path: vertebra.yaml, translation: [0, 0, 9]}
-        pair_groups: {string: [[b.left, a.v2.left], [front, v3.back]]}
-        bond_groups: {a/b/node_node: {string: [[v3.right, right]]}}
-    """
-    given = read(write(tmp_path, text))
+    builder = "builders: {string: {class: tgBasicActuatorInfo, parameters: {stiffness: %s}}}"
+    write(tmp_path, TEXTS["spine"] + builder % 7, "spine.yaml")
+    given = read(write(tmp_path, TEXTS["nested"]))
     names = ("string b/left a/v2/left", "string b/front a/v3/back", "string a/v3/right b/right")
     assert given.blueprint().cable_names[8:] == names
     string = given.cables["string"]
     assert (string.stiffness, string.tension) == (7.0, 0.0), "no pretension unless it says so"
-    builder = "builders: {string: {class: tgBasicActuatorInfo, parameters: {stiffness: 9}}}"
-    given = read(write(tmp_path, f"{text}\n        {builder}"))
+    given = read(write(tmp_path, f"{TEXTS['nested']}\n{builder % 9}"))
     assert given.cables["string"].stiffness == 9.0
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(
-    ("text", "key", "fact"),
-    [
-        (PRISM.replace("[low1, high2]", "[low1, hihg2]"), "pair_groups.prism_rod[0]", "'high2'"),
-        (PRISM.replace("RodInfo", "BoxInfo"), "builders.prism_rod.parameters.radius", "width"),
-        (PRISM.replace("tgRodInfo", "tgRoadInfo"), "builders.prism_rod.class", "'tgRodInfo'"),
-        (SPINE.replace("1.5]", "9e14]"), "substructures.v1/v2/v3", "'v3'"),
-        (PRISM.replace("prism_rod:\n    class", "rods:\n    class"), f"{ROD}[0]", "'prism_rod'"),
-        (PRISM.replace("[low2, high3]", "[high2, low1]"), f"{ROD}[1]", f"{ROD}[0]"),
-        (SPINE.replace("v3/node_node", "edge_node"), "bond_groups.string.v1/v2/edge_node", "'A/B"),
-        (SPINE.replace("node_node", "node_edge"), f"{EDGES}[0]", "NODE/NODE"),
-        (DOCKED.replace("low2/low3", "low1/high2"), "bond_groups.string.a/b/node_edge[1]", "rod"),
-        ("substructures: {v: {scale: 2}}", "substructures.v", "no path of the part 'v'"),
-        (SPINE.replace("/v2/v3: {", "/v1: {"), "substructures.v1/v1", "second path of 'v1'"),
-        ("substructures: {v: {path: my.yaml}}", "substructures", "itself"),
-        # Without an offset the parts are at one place.
-        (SPINE.replace(", offset: [0, 0, 1.5]", ""), "pair_groups.rod[0]", "pair_groups.rod[0]"),
-    ],
-)
-def test_problems_name_file_key_and_facts(text, key, fact, tmp_path, refused) -> None:
-    write(tmp_path, VERTEBRA, "vertebra.yaml")
-    write(tmp_path, PRISM, "prism.yaml")
-    file = write(tmp_path, text)
-    part = tmp_path / "vertebra.yaml" if "v1" in text and key == "pair_groups.rod[0]" else file
-    with refused(part, key, fact):
+@pytest.mark.parametrize(("base", "old", "new", "key", "fact"), ROWS["refused"])
+def test_problems_name_file_key_and_facts(base, old, new, key, fact, tmp_path, refused) -> None:
+    text = TEXTS.get(base, base)
+    assert old in text
+    file = write(tmp_path, text.replace(old, new))
+    # Without an offset the parts are at one place.
+    with refused(tmp_path / "vertebra.yaml" if key == "pair_groups.rod[0]" else file, key, fact):
         read(file)
 
 
-@pytest.mark.parametrize("part", [VERTEBRA, "pair_groups: {}"])
+@pytest.mark.parametrize("part", [TEXTS["vertebra"], "pair_groups: {}"])
 def test_a_structure_that_multiplies_is_refused_before_it_is_whole(part, tmp_path) -> None:
     """Ten of ten of ten ... parts: the whole would not fit in memory."""
     write(tmp_path, part, "level0.yaml")
@@ -252,28 +150,28 @@ def test_a_structure_that_multiplies_is_refused_before_it_is_whole(part, tmp_pat
         write(tmp_path, text, f"level{level + 1}.yaml")
     with pytest.raises(InputError) as caught:
         read(tmp_path / "level8.yaml")
-    assert caught.value.key == ("nodes" if part == VERTEBRA else "substructures")
+    assert caught.value.key == ("nodes" if "nodes" in part else "substructures")
 
 
 def test_a_substructure_may_have_no_nodes(tmp_path: Path) -> None:
     """Such as one that holds builders only."""
-    write(tmp_path, "builders: {rod: {class: tgRodInfo, parameters: {radius: 2}}}", "kinds.yaml")
-    entry = f"{{path: kinds.yaml, {QUARTER}, translation: [1, 0, 0]}}"
-    given = read(write(tmp_path, f"{VERTEBRA}\nsubstructures: {{kinds: {entry}}}"))
+    write(tmp_path, "builders: {rod: {class: tgRodInfo, parameters: {radius: 2}}}", "builders.yaml")
+    entry = "{path: builders.yaml, rotation: {axis: [0, 1, 0], angle: 90}, translation: [1, 0, 0]}"
+    given = read(write(tmp_path, f"{TEXTS['vertebra']}\nsubstructures: {{kinds: {entry}}}"))
     assert given.struts["rod"].diameter == pytest.approx(0.4)
 
 
 def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path, refused) -> None:
-    part = write(tmp_path, VERTEBRA.replace("left:", "lleft:"), "vertebra.yaml")
+    part = write(tmp_path, TEXTS["vertebra"].replace("left:", "lleft:"), "vertebra.yaml")
     with refused(part, "pair_groups.rod[3]"):
-        read(write(tmp_path, SPINE))
+        read(tmp_path / "spine.yaml")
     part.unlink()
     with refused(part, ""):
-        read(write(tmp_path, SPINE))
+        read(tmp_path / "spine.yaml")
 
 
 def test_the_structure_names_settings_that_the_scenario_replaces(tmp_path, caplog):
-    file = write(tmp_path, PRISM)
+    file = DATA / "ntrt/prism.yaml"
     # The scenario keeps the names.
     structure = converted(file, unit="dm")
     save_scenario(tmp_path, robot_of_structure(structure, str(file)).scenario)
@@ -284,7 +182,7 @@ def test_the_structure_names_settings_that_the_scenario_replaces(tmp_path, caplo
 
 
 def test_a_file_needs_a_unit_and_substructures_their_files(tmp_path: Path, refused) -> None:
-    file = write(tmp_path, PRISM)
+    file = DATA / "ntrt/prism.yaml"
     with refused(file, "unit", "missing"):
         converted(file)
     for name in ("prims", "nul\0"):

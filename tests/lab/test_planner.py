@@ -11,7 +11,6 @@ from tetra_drake.engines.simulation import Simulation
 from tetra_drake.lab.planner import Planner
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.readings import Readings
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 UP = {"p_WN": [0.0, 0.0, -1.0]}
@@ -24,7 +23,8 @@ SMALL |= {"limits": [[-1.0], [1.0]]}
 def hung() -> Scenario:
     """0.1 s of a bar of 0.5 kg on a driven cable of 200 N/m, less than half of its oscillation. So
     any force upward lifts it, and the best plan is the greatest force all the time."""
-    return scenario_of(HUNG | {"actuated": {"lift": ["line top a"]}}, 0.1, friction__stiffness=0.0)
+    tree = HUNG | {"actuated": {"lift": ["line top a"]}}
+    return scenario_of(tree, 0.1, friction__stiffness=0.0, engine="!Compiled")
 
 
 def height(scenario: Scenario, actions: float) -> float:
@@ -44,7 +44,7 @@ def test_a_plan_comes_near_the_best_one_that_is_known(hung, engine, delayed):
     first = result.trajectory.signal.sel(time=slice(0.0, 0.009)).values
     assert np.abs(first).max() < 1e-9 if delayed else first.max() > 0.1
     assert planner.decisions == 10 and planner.decisions_per_second > 0.0
-    assert 0.0 <= planner.deadlines_kept <= 1.0 and "10 decisions" in str(planner)
+    assert 0.0 <= planner.deadlines_kept <= 1.0
     again = simulate(plant, controller=planner, control_period=0.01)
     assert again.metrics.distance == result.metrics.distance and planner.decisions == 10
 
@@ -82,17 +82,19 @@ def test_more_samples_find_a_cheaper_plan(hung):
 def test_the_cost_sees_motions_at_the_true_time_and_readings_are_assumed_exactly(hung):
     seen: list[Readings] = []
     cost = lambda readings: (seen.append(readings), -readings.p_WN[..., 2].mean(axis=-1))[1]  # noqa: E731
-    plant = Simulation(hung.with_changes({"engine": "!Drake"}), control_period=0.01)
-    for _ in range(3):
-        readings = plant.step([[0.8]])
+    steps: list[Readings] = []
+    plant = hung.with_changes({"engine": "!Drake"})
+    push = lambda time, readings: (steps.append(readings), [0.8])[1]  # noqa: E731
+    simulate(plant, controller=push, control_period=0.01)
+    readings = steps[3]
     planner = Planner(hung, cost, **SMALL)
-    planner(float(readings.time[0]), readings.rows(0))
+    planner(float(readings.time), readings)
     assert seen[-1].time[:, 0].tolist() == pytest.approx([0.03 + 0.01 * k for k in range(1, 11)])
-    planner.model.assume(readings.rows(0)._replace(time=0.02))
+    planner.model.assume(readings._replace(time=0.02))
     for ours, theirs in zip(planner.model.state[1:], readings[1:], strict=True):
-        np.testing.assert_allclose(ours[0], theirs[0], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(ours[0], theirs, rtol=0.0, atol=1e-12)
     moved = planner.model.step(np.full((32, 1), 0.8)).p_WN[0]
-    np.testing.assert_allclose(moved, plant.step([[0.8]]).p_WN[0], rtol=0.0, atol=2e-5)
+    np.testing.assert_allclose(moved, steps[4].p_WN, rtol=0.0, atol=2e-5)
 
 
 def test_a_planner_that_begins_anew_still_knows_what_is_cut(hung):
@@ -111,12 +113,6 @@ def test_a_planner_that_begins_anew_still_knows_what_is_cut(hung):
     assert planner.costs == costs[2]
 
 
-def test_readings_of_another_robot_are_refused(hung, refused):
-    planner = Planner(hung, UP, **SMALL)
-    with refused("Simulation", "readings.lengths", "the shape (24,)"):
-        simulate(load_scenario("quick"), controller=planner)
-
-
 def test_a_plan_stays_while_all_samples_fail(hung):
     planner = Planner(hung.with_changes({"simulation.max_speed": "1 um/s"}), UP, **SMALL)
     readings = Simulation(hung, control_period=0.01).step([[0.8]]).rows(0)
@@ -124,36 +120,3 @@ def test_a_plan_stays_while_all_samples_fail(hung):
     assert not planner.costs and planner.decisions == 1 and np.isfinite(first).all()
     later = readings._replace(time=readings.time + 0.05)
     assert np.isfinite(planner(float(later.time), later)).all()
-
-
-@pytest.mark.parametrize(
-    ("options", "key", "fact"),
-    [
-        ({"horizon": 0.0}, "horizon", "found 0.0"),
-        ({"horizon": 1e9}, "horizon", "at most 10000 control periods"),
-        ({"temperature": -1.0}, "temperature", "found -1.0"),
-        ({"samples": 1}, "samples", "found 1"),
-        ({"decision_period": 0.015}, "decision_period", "multiple of the control period"),
-        ({"limits": [[1.0], [-1.0]]}, "limits", "least"),
-        ({"command": np.zeros((3, 1))}, "command", "Command"),
-        ({"cost": lambda readings: np.nan * readings.time}, "cost", "found nan"),
-        ({"cost": lambda readings: -np.inf + readings.time}, "cost", "found -inf"),
-        ({"cost": lambda readings: readings.p_WN}, "cost", "the shape (1, 32, 3, 3)"),
-        ({"cost": {"height": 1.0}}, "cost.height", "expected one of time"),
-        ({"cost": {"p_WN": [1.0, 2.0]}}, "cost.p_WN", "(3, 3)"),
-        ({"cost": {"p_WN": "high"}}, "cost.p_WN", "found 'high'"),
-    ],
-)
-def test_wrong_arguments_are_told_in_a_line(hung, refused, options, key, fact):
-    given = SMALL | {"cost": UP} | options
-    with refused("Planner", key, fact):
-        Planner(hung, given.pop("cost"), **given)
-    with refused("Planner", "scenario", "no driven cables"):
-        Planner(scenario_of(HUNG), UP, **SMALL)
-    for samples, fact in (
-        ([[0.0, 0.0]], "(1, 2)"),
-        (np.zeros((0, 1)), "none"),
-        ([[np.nan]], "nan"),
-    ):
-        with refused("command given", "samples", fact):
-            Planner(hung, UP, command=Command("given", 0.1, np.array(samples)), **SMALL)

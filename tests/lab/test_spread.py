@@ -3,14 +3,11 @@
 import dataclasses
 import re
 
-import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 import tetra_drake as td
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import SPREADS
 from tetra_drake.evolution.run import load_run
-from tetra_drake.formatting import uncertain
 from tetra_drake.lab.spread import record_spread
 from tetra_drake.report.result_folder import save_result_folder
 from tetra_drake.report.summary import result_text
@@ -28,22 +25,6 @@ def test_a_spread_repeats_and_holds_the_unmoved_start_and_grows_with_chaos(scena
     # The law of the thesis enlarges 100 nm, friction without steps hardly does.
     smooth = td.spread(short.with_changes({"friction": "!Coulomb"}), gait)["distance"]
     assert 1e-9 < smooth[1] - smooth[0] < 1e-5 and high - low > 2.0 * (smooth[1] - smooth[0])
-    with pytest.raises(InputError, match="seed"):
-        td.spread(short, gait, seed=-1)
-
-
-@pytest.mark.parametrize(
-    ("shown", "value", "low", "high", "text"),
-    [
-        ("14.3", 14.34, 14.33, 14.45, "14.3"),
-        ("5.212", 5.2123, 3.1, 6.04, "5.2 (3.1 to 6.0)"),
-        ("5.212", 5.2123, 5.19, 5.22, "5.212 (5.190 to 5.220)"),
-        ("312", 312.0, -40.0, 600.0, "312 (-40 to 600)"),
-        ("5.2", 5.2, float("nan"), float("nan"), "5.2"),
-    ],
-)
-def test_a_number_has_the_digits_that_its_range_allows(shown, value, low, high, text):
-    assert uncertain(shown, value, low, high) == text
 
 
 def test_titles_follow_what_the_robot_did():

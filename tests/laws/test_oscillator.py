@@ -14,25 +14,25 @@ from tetra_drake.laws.oscillator import (
     VALUE,
     Oscillators,
     correct_states,
+    euler_step,
     make_states,
-    predict_states,
     write_outputs,
 )
 
 # While both neurons of this oscillator fire, Eq. 7 is linear, without kinks. Halving the step then
 # divides the error of a method by 2^order.
 NETWORK = Network.of([[0.0, 0.4], [0.4, 0.0]], tau_a=0.3, tau_b=0.6, self_inhibition_weight=2.5)
-LINEAR = Oscillators(Matsuoka.own, NETWORK)
 
 
 START = np.array([0.3, 0.25, 0.1, 0.12])
 """u of both neurons, then v."""
+LINEAR = Oscillators(Matsuoka.own, NETWORK, START, gains=np.zeros(3))
 
 
 def last_output(steps: int, *, listing: bool) -> np.ndarray:
     output = np.empty((steps if listing else steps + 1, 1))
     inputs = np.full((1, 2), 0.5)
-    write_outputs(Packed((LINEAR, make_states(START))), inputs, 0.2 / steps, listing, output)
+    write_outputs(Packed((LINEAR, make_states(LINEAR))), inputs, 0.2 / steps, listing, output)
     return output[-1]
 
 
@@ -42,10 +42,10 @@ by_runge_kutta = functools.partial(last_output, listing=False)
 
 def by_heun(steps: int) -> np.ndarray:
     """Refuses each step once, and goes back to its start."""
-    states, inputs = make_states(START), np.full(2, 0.5)
+    states, inputs = make_states(LINEAR), np.full(2, 0.5)
     for _ in range(steps):
         for accepted in (False, True):
-            predict_states(LINEAR, inputs, 0.2 / steps, states)
+            euler_step(LINEAR, inputs, 0.2 / steps, states)
             correct_states(LINEAR, inputs, 0.2 / steps, accepted, states)
     return states[:, VALUE]
 

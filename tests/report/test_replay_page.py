@@ -58,18 +58,17 @@ def test_missing_and_damaged_files_are_refused_by_name(folder, name, damage):
     assert caught.value.source in (str(folder / name), str(folder))
 
 
-@pytest.mark.parametrize(
-    ("key", "change"),
-    [
-        ("body", lambda dataset: dataset.isel(body=slice(2))),
-        ("tension", lambda dataset: dataset.drop_vars("tension")),
-        ("p_WB", lambda dataset: dataset.assign(p_WB=dataset.p_WB.where(False))),
-        ("time", lambda dataset: dataset.isel(time=slice(None, None, -1))),
-    ],
-    ids=["robot", "missing", "nan", "backward"],
-)
-def test_an_unfitting_trajectory_is_refused(folder, result, key, change, refused, monkeypatch):
-    changed = change(result.trajectory)
+UNFITTING = {
+    "body": lambda dataset: dataset.isel(body=slice(2)),
+    "tension": lambda dataset: dataset.drop_vars("tension"),
+    "p_WB": lambda dataset: dataset.assign(p_WB=dataset.p_WB.where(False)),
+    "time": lambda dataset: dataset.isel(time=slice(None, None, -1)),
+}
+
+
+@pytest.mark.parametrize("key", UNFITTING)
+def test_an_unfitting_trajectory_is_refused(folder, result, key, refused, monkeypatch):
+    changed = UNFITTING[key](result.trajectory)
     monkeypatch.setattr(xarray, "load_dataset", lambda path, engine: changed)
     with refused(folder / "trajectory.nc", key, ""):
         load_or_simulate(folder)

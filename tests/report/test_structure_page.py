@@ -9,7 +9,6 @@ from tetra_drake.report.summary import result_text
 from tetra_drake.robot.remarks import sinking_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.settings.units import fitting
 from tetra_drake.study.equilibrium import robot_of_file, structure_text, study_equilibrium
 
 BEAM = """
@@ -42,9 +41,3 @@ def test_a_robot_that_sinks_into_its_ground_is_told_a_stiffness(tmp_path, result
     assert "would bear it" not in result_text(result)
     floating = load_scenario(file).with_changes({"terrain": "!Nothing", "robot.gravity": 0.0})
     assert not sinking_remark(Robot.of(floating))
-
-
-def test_lengths_that_are_round_in_no_unit_are_shown_in_metric_units():
-    turned = tuple(0.2 * np.cos([0.1, 0.7, 1.3]))
-    assert fitting(turned).length_name == "cm"
-    assert fitting(load_scenario("thesis").robot.lengths).length_name == "in"

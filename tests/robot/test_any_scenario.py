@@ -14,6 +14,7 @@ from tetra_drake.scenario.load import dump_scenario, load_scenario
 ANY = {
     "cpg.signals": ["live", "listing"],
     "cpg.feedback": [[], ["length"], ["load", "pitch"]],
+    "cpg": ["!Phase {gain: 1 N}", "!Phase {gain: 1 N, common: [lag], coupling: [0, 9 1/s]}"],
     "engine": ["!Drake", "!Compiled"],
 } | {key: list(laws.values()) for key, laws in EXAMPLES.items()}
 ROW = {

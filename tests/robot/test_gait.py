@@ -81,7 +81,7 @@ BAD: list[tuple[object, str, str]] = [
     (gait_file({"gain lenght": 0.1}), "parameters", "'gain lenght'"),
     (gait_file({"gain load": 0.5}), "parameters", "'gain load'"),  # the thesis has no feedback
     (gait_file(turn=0.5), "turn", "0.5"),  # its cables are driven in pairs, left and right
-    (gait_file(parameters={"x": 1.0, "z": 2.0}), "parameters", "25 names"),  # of a policy
+    (gait_file(parameters={"x": 1.0, "z": 2.0}), "parameters", "26 names"),  # of a policy
     ({"schema": 1, "weights": [1.0] * 24, "tau_a_s": 0.3}, "parameters.weight ", "a list"),
     ({"schema": 2, "weights": {}, "gains": [], "tau_a_s": 0.3}, "parameters.gain ", "a list"),
     ('{"schema": 3, "schema": 3, "parameters": {}}', "", "twice"),

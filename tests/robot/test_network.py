@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tetra_drake.errors import InputError
-from tetra_drake.laws.matsuoka import Weights
+from tetra_drake.laws.matsuoka import connections
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
@@ -31,14 +31,14 @@ def test_two_oscillators_silence_each_other_with_weights_above_two(scenario, low
 
 def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
     near = scenario.with_changes(SIDES | {"cpg.reach": 1})
-    weights = Weights(near.blueprint(), near.cpg.reach)
+    pairs = connections(near.blueprint(), near.cpg.reach)
     # Each junction's pair within (2 weights per kind of neuron), and to each neighbouring pair.
-    assert len(weights.couplings) == 2 * (4 * 2 + 3 * 2 * 4)
-    junction = Robot.of(near).senses.ahead[weights.couplings // 2]
+    assert len(pairs) == 2 * (4 * 2 + 3 * 2 * 4)
+    junction = Robot.of(near).senses.ahead[pairs // 2]
     assert (np.abs(np.diff(junction, axis=1)) <= 1).all()
     gait = seeded_gait(near)
     network = Robot.of(near).oscillators(gait).constants
-    assert len(network.weight) == len(weights.couplings) + 16  # and the partners
+    assert len(network.weight) == len(pairs) + 16  # and the partners
     alone = scenario.with_changes({"cpg.reach": 0})
     assert [*seeded_gait(alone).parameters] == ["tau_A", "tau_B"]
 

@@ -24,7 +24,7 @@ class Trials(dict[str, object]):
 
 @pytest.mark.slow
 def test_the_page_is_current() -> None:
-    assert thesis_page.page(recorded_run("thesis"), SIMULATED) + "\n" == TEXT
+    assert thesis_page.page(recorded_run("thesis"), SIMULATED) == TEXT
 
 
 def test_the_page_is_current_but_for_the_trials(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,7 +5,7 @@ import pandas
 import pytest
 from helpers.analytic import in_threads
 from helpers.synthetic_run import tiny_scenario, write_run
-from thinning import last_population, thin
+from thinning import thin
 
 from tetra_drake.evolution.entries import EliteLine
 from tetra_drake.evolution.manifest import RunRecord
@@ -39,7 +39,8 @@ def metrics_of(trial, i, fitness):
     """More metrics than a synthetic run has."""
     special = {ALONE: (0.1, 0.45), EDGE: (1.00001 / 3.0, 0.59), BEYOND: (0.5, 0.59)}
     index, lifted = special.get(i if trial == 0 else -1, (0.9, 0.5))
-    return {"travelling_index": index, "lifted": lifted, "twist": 0.1 + fitness / 70.0}
+    chosen = {"travelling_index": index, "lifted": lifted, "twist": 0.1 + fitness / 70.0}
+    return chosen | {"tension": 1.0 / 3.0}  # which selects no gaits
 
 
 @pytest.fixture(scope="module")
@@ -64,18 +65,30 @@ def runs(tmp_path_factory):
     return load_run(run), load_run(folder / "thinned")
 
 
-def test_every_evaluation_is_there_and_those_that_matter_are_whole(runs):
+def test_every_evaluation_is_there_and_those_that_matter_have_their_genomes(runs):
     run, thinned = runs
     assert len(thinned.evaluations) == len(run.evaluations)
     assert len(thinned.with_parameters) < 0.8 * len(run.with_parameters)
-    fitness = run.evaluations.groupby("trial")["fitness"]
-    rises = run.evaluations[run.evaluations["fitness"] == fitness.cummax()]
-    last = pandas.concat([last_population(run, 0), last_population(run, 1)])
-    again = run.evaluations.query("trial == 0 and index == @AGAIN")
-    for matter in (run.initial(), rises, run.best(BEST_GAITS), last, again, elites(run)):
-        rows = run.evaluations.loc[matter.index].drop(columns="wall_time_s")
-        kept = thinned.evaluations.loc[matter.index].drop(columns="wall_time_s")
+    first = run.evaluations.query("trial == 0")
+    rises = first[first["fitness"] == first["fitness"].cummax()]
+    again = first.query("index == @AGAIN")
+    start = first.query("iteration == 0")
+    inexact = ["wall_time_s", "tension"]
+    for matter in (start, rises, run.best(BEST_GAITS), again, elites(run)):
+        rows = run.evaluations.loc[matter.index].drop(columns=inexact)
+        kept = thinned.evaluations.loc[matter.index].drop(columns=inexact)
         pandas.testing.assert_frame_equal(kept, rows, check_exact=True)
+    tensions = thinned.evaluations["tension"]
+    walked = thinned.with_parameters.dropna(subset="fitness").index
+    assert (tensions[walked] == 0.333333).all() and tensions.drop(walked).isna().all()
+
+
+def test_initial_populations_are_kept_where_a_page_reads_them(runs, tmp_path):
+    run, thinned = runs
+    thin(run.directory, tmp_path / "kept", initial=True)
+    others = run.initial().query("trial > 0").index
+    wholes = [one.with_parameters.index for one in (thinned, load_run(tmp_path / "kept"))]
+    assert [others.isin(whole).all() for whole in wholes] == [False, True]
 
 
 def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
@@ -84,13 +97,15 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     before, after = run.evaluations.loc[rest], thinned.evaluations.loc[rest]
     loss = (before["fitness"] - after["fitness"]).dropna()
     assert (loss >= 0.0).all() and (loss < 1e-4).all() and (loss > 0.0).any()
+    is_best = run.evaluations["fitness"] == run.evaluations.groupby("trial")["fitness"].cummax()
+    assert (loss[is_best.loc[loss.index]] == 0.0).all() and (is_best.loc[rest]).any()
     assert [float(f"{x:.3g}") for x in before["twist"].dropna()] == after["twist"].dropna().tolist()
     assert thinned.evaluations["failure"].equals(run.evaluations["failure"])
 
 
 def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     run, thinned = runs
-    assert thinned.fittest().equals(run.fittest())
+    assert thinned.fittest().drop("tension").equals(run.fittest().drop("tension"))
     assert run_text(thinned).replace(str(thinned.directory), str(run.directory)) == run_text(run)
     on_map = [table[["trial", "index"]].to_numpy().tolist() for table in map(elites, runs)]
     assert on_map[0] == on_map[1]

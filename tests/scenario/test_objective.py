@@ -6,19 +6,21 @@ from pytest import approx
 
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 
-SPREADS = """
-disturbances:
-  draws: 4
-  spreads: {robot.cables.damping: 0.1, "friction.stiction_range, friction.stiction_damping": 0.05}
-  start: 0.02
-"""
+DAMPING, RANGE, OTHER = "robot.cables.damping", "friction.stiction_range", "robot.density"
+ROUGH = {"terrain": "!Rough {amplitude: 0.1 in, wavelength: 2 in}"}
 
 
-def test_a_draw_changes_what_it_names_within_its_spread(load_text):
-    scenario = load_text(SPREADS)
+def among(scenario, spreads, *, start=0.1, **changes):
+    """The scenario with disturbances."""
+    disturbances = {"draws": 4, "start": start, "spreads": spreads}
+    return scenario.with_changes(changes | {"disturbances": disturbances})
+
+
+def test_a_draw_changes_what_it_names_within_its_spread(scenario):
+    spreads = {DAMPING: 0.1, f"{RANGE}, friction.stiction_damping": 0.05}
+    scenario = among(scenario, spreads, start=0.02)
     draws = [draw_disturbances(scenario, (7, k)) for k in range(200)]
-    joined = "friction.stiction_range, friction.stiction_damping"
-    for key, spread in (("robot.cables.damping", 0.1), (joined, 0.05)):
+    for key, spread in spreads.items():
         factors = np.array([draw.factors[key] for draw in draws])
         assert np.abs(factors - 1.0).max() <= spread
         # Uniform: the extremes of 200 miss the ends by 1 % of the width on average.
@@ -39,18 +41,12 @@ def test_a_draw_changes_what_it_names_within_its_spread(load_text):
     assert changed.disturbances is None
 
 
-DAMPING, RANGE, OTHER = "robot.cables.damping", "friction.stiction_range", "robot.density"
-ROUGH = {"terrain": "!Rough {amplitude: 0.1 in, wavelength: 2 in}"}
-
-
 OTHERS = {OTHER: 0.1, DAMPING: 0.2, RANGE: 0.1}, {f"{OTHER}, {RANGE}": 0.1, DAMPING: 0.2}
 
 
 @pytest.mark.parametrize("spreads", OTHERS)
 def test_what_else_is_disturbed_changes_no_number_of_a_draw(scenario, spreads):
-    both = {"draws": 2, "start": 0.1}
-    first = scenario.with_changes(ROUGH | {"disturbances": both | {"spreads": {DAMPING: 0.2}}})
-    other = scenario.with_changes(ROUGH | {"disturbances": both | {"spreads": spreads}})
+    first, other = (among(scenario, each, **ROUGH) for each in ({DAMPING: 0.2}, spreads))
     for k in range(5):
         expected, draw = (draw_disturbances(each, (3, 0, 1, k)) for each in (first, other))
         assert draw.factors[DAMPING] == expected.factors[DAMPING]
@@ -60,9 +56,7 @@ def test_what_else_is_disturbed_changes_no_number_of_a_draw(scenario, spreads):
 
 def test_keys_are_drawn_independently(scenario):
     spreads = {DAMPING: 0.1, RANGE: 0.1, OTHER: 0.1, "ground.damping": 0.1}
-    changes = {"disturbances": {"draws": 2, "spreads": spreads, "start": 0.1}}
-    changed = scenario.with_changes(ROUGH | changes)
-    rows = []
+    changed, rows = among(scenario, spreads, **ROUGH), []
     for k in range(400):
         draw = draw_disturbances(changed, (3, k))
         rows.append([*draw.factors.values(), *draw.moves[0, :2], draw.terrain_seed])
@@ -72,7 +66,6 @@ def test_keys_are_drawn_independently(scenario):
 
 def test_joined_keys_have_one_factor_in_any_order(scenario):
     def factor(joined: str) -> float:
-        changed = scenario.with_changes({"disturbances": {"draws": 2, "spreads": {joined: 0.2}}})
-        return draw_disturbances(changed, (3, 1)).factors[joined]
+        return draw_disturbances(among(scenario, {joined: 0.2}), (3, 1)).factors[joined]
 
     assert factor(f"{DAMPING}, {RANGE}") == factor(f"{RANGE},{DAMPING}") != factor(DAMPING)

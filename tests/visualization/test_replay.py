@@ -41,6 +41,9 @@ NAME, DEED = '<script>bad()</script> & \\1 "gait"', "walks 4.4 in"
 TITLE = f"{NAME}: {DEED}"
 
 
+PLACE = "path => viewer.scene_tree.find(path).object.position.toArray()"
+
+
 def recorded(scenario):
     return simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
 
@@ -100,14 +103,9 @@ def test_in_a_browser_bodies_are_where_they_were_and_cables_between_them(browser
         wait_until_loaded(page)
         for frame in (4, -1):
             do(page, "show", float(frames["time"].values[frame]))
-            places, length = page.evaluate(
-                """bodies => [
-                    bodies.map(body => viewer.scene_tree.find(["robot", body])
-                        .object.position.toArray()),
-                    viewer.scene_tree.find(["cables", "actuated", "T1-T2 outer bottom_left"])
-                        .object.scale.z]""",
-                frames["body"].values.tolist(),
-            )
+            places = [page.evaluate(PLACE, ["robot", body]) for body in frames["body"].values]
+            cable = ["cables", "actuated", "T1-T2 outer bottom_left"]
+            length = page.evaluate(f"viewer.scene_tree.find({cable}).object.scale.z")
             # Times are rounded to 0.01 ms, and nothing moves at 1 m/s.
             np.testing.assert_allclose(places, frames["p_WB"].values[frame], rtol=0, atol=1e-5)
             feet = frames["p_WN"].sel(node=["T1 bottom_left", "T2 bottom_left"]).values[frame]
@@ -126,8 +124,7 @@ def test_bodies_with_slashes_in_their_names_are_where_they_rest(browser, tmp_pat
         wait_until_loaded(loaded)
         loaded.evaluate("film.show(0)")  # later it swings
         for name, place in zip(robot.structure.bodies, robot.structure.p_WB, strict=True):
-            path = ["robot", *name.split("/")]
-            found = loaded.evaluate(f"viewer.scene_tree.find({path}).object.position.toArray()")
+            found = loaded.evaluate(PLACE, ["robot", *name.split("/")])
             assert found == pytest.approx(place.tolist(), abs=1e-4)
 
 

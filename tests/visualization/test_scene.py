@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from helpers import prism
+from helpers.laws import UNEVEN
 from helpers.made_up_walk import make_row, make_walk
 from helpers.meshcat_page import commands
 from matplotlib.colors import hex2color
 
-from tetra_drake.laws.terrain import Incline, Rough, Steps
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
@@ -15,17 +15,9 @@ from tetra_drake.settings.units import INCH, INCHES
 from tetra_drake.visualization import scene
 
 
-@pytest.mark.parametrize(
-    "terrain",
-    [
-        Incline(slope=0.2),
-        Steps(height=0.3 * INCH, depth=6.0 * INCH, count=3),
-        Rough(amplitude=0.3 * INCH, wavelength=4.0 * INCH),
-    ],
-    ids=lambda terrain: type(terrain).__name__,
-)
-def test_the_drawn_floor_is_the_ground_a_node_radius_lower_and_as_fine(terrain, meshcat):
-    robot = Robot.of(load_scenario("coulomb").with_changes({"terrain": terrain}))
+@pytest.mark.parametrize("name", ["incline", "steps", "rough"])
+def test_the_drawn_floor_is_the_ground_a_node_radius_lower_and_as_fine(name, meshcat):
+    robot = Robot.of(load_scenario("coulomb").with_changes({"terrain": UNEVEN[name]}))
     ground, radius = robot.ground, scene.drawn_radii(robot.structure)[1].min()
     points = make_walk().p_WN.values
     scene.set_surroundings(meshcat, robot, points, seen=points[0])

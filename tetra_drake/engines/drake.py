@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import bisect
 import dataclasses
+import functools
+import itertools
 import math
 import weakref
-from collections.abc import Mapping
 from time import perf_counter
 from typing import NamedTuple
 
@@ -22,9 +22,7 @@ from pydrake.systems.framework import Context, Diagram
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import eigsh
 
-from tetra_drake.engines.batch import LoneRobot, Viewer
-from tetra_drake.engines.engine import Engine
-from tetra_drake.engines.lanes.tables import numbers_of, views
+from tetra_drake.engines.engine import SAME_TIME, Engine, Viewer
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sampler, drives_at, frame_of
 from tetra_drake.engines.time_limit import check_time
@@ -35,23 +33,20 @@ from tetra_drake.errors import (
     StepBudgetExceeded,
     check_type,
 )
-from tetra_drake.kernels.packed import write_tables
-from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
-from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
-from tetra_drake.results.trajectory import Motion
+from tetra_drake.robot.command import signals_of_one
 from tetra_drake.robot.equilibrium import Unactuated, damping_at_rest, mass_matrix
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
+from tetra_drake.robot.signals import DrivenRobot, Pilot
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.robot.structure import with_origins
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import GivenScenario, given_scenario
-from tetra_drake.systems import GroundContact, HeldSignals
+from tetra_drake.systems import GroundContact, HeldSignals, SampledController
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 _WITNESS_WINDOW = 2e-5  # s; precision of witnessed mode changes for accuracies of 1e-3 and above
@@ -73,8 +68,6 @@ _FINEST = 2e-5
 _RENEWAL = 20
 """Most steps with one Jacobian of a robot with anchors or joints, whose stiff springs turn with its
 bodies."""
-_WORK = ("steps", "derivative_evaluations", "jacobian_evaluations")
-"""Counts of the integrator's work; fields of IntegratorWork."""
 
 
 class _Pace(NamedTuple):
@@ -107,36 +100,53 @@ nothing."""
 class DrakeEngine(Engine):
     """Engine `drake`: simulates the Drake diagram of one robot at a time."""
 
-    can_be_watched, has_threads = True, False
+    has_threads = False
 
-    def alone(self, robot: DrivenRobot, *, record: bool, viewer: Viewer | None) -> LoneRobot:
-        return _DiagramRobot(robot, record=record, viewer=viewer)
+    def simulate(
+        self, robot: DrivenRobot, *, record: bool = False, viewer: Viewer | None = None
+    ) -> SimulationResult:
+        return _DiagramRobot(robot, record=record, viewer=viewer).simulated()
 
 
-class _DiagramRobot(LoneRobot):
-    """Simulation of one robot in its own Drake diagram. If the robot has no gait, the diagram's
-    system `controller`, a HeldSignals, holds the signals of a command or of a program."""
+def _signals(pilot: Pilot, first: np.ndarray, time: float, readings: Readings) -> np.ndarray:
+    """Signals (m,) in N of a policy or a controller, for a SampledController, after the `first`."""
+    # Drake's multiples of the period may be just before the end.
+    return signals_of_one(pilot, readings) if 0.0 < time < pilot.end - SAME_TIME else first
+
+
+class _DiagramRobot:
+    """Simulation of one robot from start to end, in a Drake diagram of its own.
+
+    If the robot has no gait, the diagram has a system `controller`: a SampledController for a
+    policy or a controller, or a HeldSignals for a command. After an event, the simulation goes on
+    with the diagram of the changed robot, from the same state.
+    """
 
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
-        self.driven, self._record, self._viewer = driven, record, viewer
-        self.first = driven
-        robot, engine = driven.robot, driven.robot.scenario.settings_of(Drake)
+        self._driven, self._record, self._viewer = driven, record, viewer
+        self._marks, self._changes = driven.marks.tolist(), driven.changes
+        self._observer, self._speed_limit = Observer(driven), speed_limit(driven)
+        self._build(driven.robot)
+        self._monitor()
+
+    def _build(self, robot: Robot) -> None:
+        """Makes the diagram of a robot, and what follows its simulation."""
+        driven, settings = self._driven, robot.scenario.settings_of(Drake)
         if (gait := driven.oscillating) is not None:
             diagram = MakeTensegrityDiagram(robot, gait, steering=driven.steering)
+        elif driven.pilot is not None:
+            law = functools.partial(_signals, driven.pilot, driven.robot.first_signals)
+            system = SampledController(robot, law, period=driven.pilot.period)
+            diagram = MakeTensegrityDiagram(robot, controller=system)
         else:
             diagram = MakeTensegrityDiagram(robot, controller=HeldSignals(robot))
-        self._diagram, self._steps = diagram, _Steps.of(robot, engine)
+        self._diagram, self._steps = diagram, _Steps.of(robot, settings)
         self._simulator = _make_simulator(diagram, self._steps)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
-        self._observer = Observer(driven)
         self._work = _Work(self._simulator)
         self._aimer = _StepAimer(diagram, self._simulator, self._steps, self._work)
-        times = motion_times(robot.scenario.simulation, record=record)
+        times = motion_times(driven.robot.scenario.simulation, record=self._record)
         self._sampler = Sampler(diagram, times, max_step=self._steps.pace.max_step)
-        self.wall_time, self._speed_limit = 0.0, speed_limit(driven)
-        self._marks, self._changes = driven.marks.tolist(), driven.changes
-        self._held, self._change_end = robot.first_signals, 0.0
-        self._monitor()
 
     def _monitor(self) -> None:
         """Lets _after_step() follow the simulation."""
@@ -144,123 +154,77 @@ class _DiagramRobot(LoneRobot):
         this = weakref.proxy(self)
         self._simulator.set_monitor(lambda context: this._after_step(context))
 
-    def advance_to(self, time: float) -> None:
-        passed = bisect.bisect_right(self._marks, time)
-        stops = {*self._marks[:passed], time}
-        del self._marks[:passed]
-        if self._simulator.get_context().get_time() < self._change_end < time:
-            stops.add(self._change_end)
+    def simulated(self) -> SimulationResult:
+        """The result at the end of the simulation. Raises Diverged or StepBudgetExceeded."""
+        robot, started = self._driven.robot, perf_counter()
+        try:
+            for before, after in itertools.pairwise(robot.phases):
+                # An action at the time of an event is before it, as on the other engines.
+                self._advance_to(after.begins + (SAME_TIME if self._driven.pilot else 0.0))
+                self._become(after.robot, after.p_BC - before.p_BC)
+            self._advance_to(robot.scenario.simulation.duration)
+        except SimulationFailure as failure:
+            failure.wall_time = perf_counter() - started
+            raise
+        wall_time = perf_counter() - started
+        accuracy = self._simulator.get_integrator().get_target_accuracy()
+        return make_result(
+            self._driven,
+            self._sampler.motion(),
+            totals=self._observer.tally,
+            work=self._work.total(self._steps.scheme, accuracy),
+            wall_time=wall_time,
+            record=self._record,
+        )
+
+    def _advance_to(self, time: float) -> None:
+        """Simulates to a time (s), unless it has passed."""
+        if time <= self._simulator.get_context().get_time():
+            return
+        stops = {time, *(mark for mark in self._marks if mark <= time)}
+        self._marks = [mark for mark in self._marks if mark > time]
         for stop in sorted(stops):
-            started = perf_counter()
             try:
                 self._simulator.AdvanceTo(stop)
             except SimulationFailure:
                 raise
             except RuntimeError as error:
+                if error.__traceback__ and error.__traceback__.tb_next:
+                    raise  # from Python code in the diagram, such as a controller
                 # Errors of Drake: the step became too small, or the state is not finite.
                 now, reason = self._simulator.get_context().get_time(), str(error).strip()
                 raise Diverged(time=now, reason=reason.splitlines()[0]) from error
-            finally:
-                self.wall_time += perf_counter() - started
             if stop in self._changes:
-                self.hold(self._changes[stop])
+                context = self._simulator.get_mutable_context()
+                holder = self._diagram.GetSubsystemByName("controller")
+                holder.Hold(holder.GetMyMutableContextFromRoot(context), self._changes[stop])
 
-    def hold(self, signals: np.ndarray) -> None:
-        context = self._simulator.get_mutable_context()
-        if (signals != self._held).any():
-            end = context.get_time() + self.driven.robot.scenario.cpg.listing_step
-            self._change_end = round(end, MARK_DECIMALS)
-        self._held = signals.copy()
-        holder = self._diagram.GetSubsystemByName("controller")
-        holder.Hold(holder.GetMyMutableContextFromRoot(context), signals)
-
-    def readings(self) -> Readings:
-        context = self._simulator.get_context()
-
-        def table(system: str, port: str, columns: int) -> np.ndarray:
-            source = self._diagram.GetSubsystemByName(system)
-            numbers = source.GetOutputPort(port).Eval(source.GetMyContextFromRoot(context))
-            return np.reshape(numbers, (-1, columns))
-
-        return Readings.of(
-            self.driven.robot.structure,
-            time=context.get_time(),
-            state=self._state.Eval(context),
-            cable_forces=table("cables", "cable_forces", CABLE_FORCE_COLUMNS),
-            ground_forces=table("ground", "ground_forces", GROUND_FORCE_COLUMNS),
-        )
-
-    def become(self, robot: Robot, p_BC: np.ndarray) -> _DiagramRobot:
-        driven = dataclasses.replace(self.driven, robot=robot)
-        after = _DiagramRobot(driven, record=self._record, viewer=self._viewer)
-        after.first, after._speed_limit = self.first, self._speed_limit
-        after.wall_time, after._change_end = self.wall_time, self._change_end
-        numbers, bodies = self.numbers(), 13 * len(p_BC)
-        of_bodies = numbers["continuous"][:bodies]
-        of_bodies[:] = with_origins(of_bodies, p_BC)
-        after.restore(numbers)
-        after._marks = self._marks.copy()
-        after._sampler.follow(self._sampler)
-        return after
-
-    def motion(self) -> Motion:
-        return self._sampler.motion()
-
-    def numbers(self) -> dict[str, np.ndarray]:
-        context, work = self._simulator.get_context(), self._work.total()
-        groups = range(context.num_discrete_state_groups())
-        held = [context.get_discrete_state(group).value() for group in groups]
-        return {
-            "time": np.array(context.get_time()),
-            "continuous": context.get_continuous_state_vector().CopyToVector(),
-            "discrete": np.concatenate([np.zeros(0), *held]),
-            "held": self._held,
-            "work": np.array([getattr(work, name) for name in _WORK]),
-            "aim": self._aimer.numbers(),
-            "tally": numbers_of(self._observer.tally),
-        }
-
-    def remember(self, motion: Motion) -> None:
-        self._sampler.remember(motion)
-
-    def restore(self, numbers: Mapping[str, np.ndarray]) -> None:
-        context, tally = self._simulator.get_mutable_context(), self._observer.tally
-        time, state = float(numbers["time"]), numbers["continuous"]
-        context.SetTime(time)
+    def _become(self, robot: Robot, p_BC: np.ndarray) -> None:
+        """Goes on with another robot in place of this one, whose nodes move on in the same way. The
+        origins of its bodies' frames are at p_BC (bodies, 3) in m in the frames of the old one."""
+        simulator, aimer, sampler = self._simulator, self._aimer, self._sampler
+        work = self._work.total()
+        self._build(robot)
+        old, context = simulator.get_context(), self._simulator.get_mutable_context()
+        state, bodies = old.get_continuous_state_vector().CopyToVector(), 13 * len(p_BC)
+        state[:bodies] = with_origins(state[:bodies], p_BC)
+        context.SetTime(old.get_time())
         context.SetContinuousState(state)
-        first = 0
         for group in range(context.num_discrete_state_groups()):
-            end = first + context.get_discrete_state(group).size()
-            context.SetDiscreteState(group, numbers["discrete"][first:end])
-            first = end
-        write_tables(tally, views(tally, numbers["tally"]))
-        self._sampler.go_on(time, state.copy())
-        self._marks = [mark for mark in self.first.marks.tolist() if mark > time]
-        self._held = numbers["held"].copy()
-        work = dict(zip(_WORK, numbers["work"].tolist(), strict=True))
-        self._work.before = IntegratorWork(scheme="", accuracy=0.0, **work)
-        self._aimer.restore(numbers["aim"])
+            context.SetDiscreteState(group, old.get_discrete_state(group).value())
+        self._observer.follow(robot)
+        self._work.before = work
+        self._sampler.follow(sampler, context)
+        self._aimer.follow(aimer)
         parameters = InitializeParams()
         parameters.suppress_initialization_events = True
-        self._simulator.clear_monitor()  # it would aim the next step anew
-        self._simulator.Initialize(parameters)
+        self._simulator.Initialize(parameters)  # without a monitor, which would aim the step anew
         self._monitor()
-
-    def result(self) -> SimulationResult:
-        accuracy = self._simulator.get_integrator().get_target_accuracy()
-        return make_result(
-            self.first,
-            self._sampler.motion(),
-            totals=self._observer.tally,
-            work=self._work.total(self._steps.scheme, accuracy),
-            wall_time=self.wall_time,
-            record=self._record,
-        )
 
     def _after_step(self, context: Context) -> None:
         # Nothing here may change the simulation, whether it is recorded or watched or not.
         check_time()
-        robot, viewer = self.driven.robot, self._viewer
+        robot, viewer = self._driven.robot, self._viewer
         bodies, now = self._state.Eval(context), context.get_time()
         velocities = bodies[7 * len(robot.structure.bodies) :]
         if not np.abs(velocities.reshape(-1, 6)[:, 3:]).max() <= self._speed_limit:
@@ -273,7 +237,7 @@ class _DiagramRobot(LoneRobot):
         self._aimer.aim(context)
         self._sampler.after_step(context)
         signals, drives = [self._signals.Eval(context)], drives_at(self._diagram, context)
-        if now == self.driven.start_up and self._diagram.HasSubsystemNamed("cpg"):
+        if now == self._driven.start_up and self._diagram.HasSubsystemNamed("cpg"):
             # The event that lets signals act is after this step.
             cpg = self._diagram.GetSubsystemByName("cpg")
             signals.append(cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context)))
@@ -281,7 +245,7 @@ class _DiagramRobot(LoneRobot):
             moment = np.array([now]), bodies[np.newaxis], each[np.newaxis], drives[np.newaxis]
             self._observer.add(*moment)
         if viewer is not None and viewer.wants(now):
-            viewer.show(frame_of(self.first.robot, self._diagram, context))
+            viewer.show(frame_of(robot, self._diagram, context))
 
 
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
@@ -470,17 +434,12 @@ class _StepAimer:
         self._longest = steps.pace.max_step
         self._jacobian_is_old = False
 
-    def numbers(self) -> np.ndarray:
-        """The state of the aimer as one array, for restore()."""
-        longest = self._work.integrator.get_maximum_step_size()
-        own = [self._last_time, self._longest, float(self._jacobian_is_old), longest, self._age]
-        return np.concatenate([own, self._last_velocities, self._acceleration])
-
-    def restore(self, numbers: np.ndarray) -> None:
-        """Puts the aimer into a state of numbers()."""
-        self._last_time, self._longest, is_old, longest, self._age = numbers[:5].tolist()
-        self._jacobian_is_old = bool(is_old)
-        self._last_velocities, self._acceleration = np.split(numbers[5:].copy(), 2)
+    def follow(self, other: _StepAimer) -> None:
+        """Goes on as another aimer would, in the diagram of a changed robot."""
+        self._last_time, self._last_velocities = other._last_time, other._last_velocities
+        self._longest, self._acceleration = other._longest, other._acceleration
+        self._jacobian_is_old, self._age = other._jacobian_is_old, other._age
+        longest = other._work.integrator.get_maximum_step_size()
         self._work.integrator.set_maximum_step_size(longest)
         self._work.integrator.request_initial_step_size_target(longest)  # for Initialize()
 
@@ -497,7 +456,7 @@ class _StepAimer:
             return
         velocities = self._state.Eval(context)[-self._last_velocities.size :]
         step_taken = context.get_time() - self._last_time
-        if step_taken > 0.0:
+        if step_taken > SAME_TIME:  # a step to an action at a mark may be nothing but rounding
             self._acceleration = (velocities - self._last_velocities) / step_taken
         self._last_time, self._last_velocities = context.get_time(), velocities
 

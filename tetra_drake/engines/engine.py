@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import functools
-from collections.abc import Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from tetra_drake.engines.batch import Batch, LoneRobot, SerialBatch, Viewer
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.on_demand import loaded
 from tetra_drake.results.result import SimulationResult
@@ -17,19 +14,36 @@ from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.world import World
 
+if TYPE_CHECKING:
+    import xarray
+
+SAME_TIME = 1e-9
+"""Largest difference (s) of two times that are the same except for rounding."""
 _BRIEF = 0.01
 """Duration (s) of a simulation whose only purpose is to compile the kernels."""
 
 
-class Engine:
-    """Base class of engines, which simulate robots. Subclasses implement alone() or start()."""
+class Viewer(Protocol):
+    """Display of a simulation while it runs."""
 
-    can_be_watched: ClassVar[bool] = False
-    """True if start() accepts a viewer."""
+    def wants(self, time: float) -> bool:
+        """True if the viewer wants to show the robot at this simulated time (s). The engine asks
+        after each step, and calls show() if it is True."""
+
+    def show(self, frame: xarray.Dataset) -> None:
+        """Shows the robot. `frame` is a trajectory with a single sample; see
+        results.trajectory.make_dataset."""
+
+
+class Engine:
+    """Base class of engines, which simulate robots from start to end. Subclasses implement
+    simulate()."""
+
     lanes: ClassVar[int] = 1
-    """Number of robots that one thread simulates side by side."""
+    """Number of robots that one thread simulates side by side: more than one on the compiled
+    engine, in a LaneBatch."""
     has_threads: ClassVar[bool] = True
-    """True if the engine is faster with several threads, each with its own batch."""
+    """True if the engine is faster with several threads, each with its own robots."""
 
     def check(self, scenario: World) -> None:
         """Raises InputError if the engine cannot simulate the scenario."""
@@ -44,45 +58,24 @@ class Engine:
         with contextlib.suppress(SimulationFailure):  # recording needs kernels, too
             self.simulate(driven_robot(scenario, seeded_gait(scenario)), record=True)
 
-    def start(
-        self,
-        robots: Sequence[DrivenRobot],
-        *,
-        places: int | None = None,
-        record: bool = False,
-        viewer: Viewer | None = None,
-        threads: int = 1,
-    ) -> Batch:
-        """Starts a batch: puts robots at their start, side by side.
-
-        Args:
-            robots: at least one robot; all have the same structure and kinds of laws.
-            places: number of robots that the batch can hold; by default the number of `robots`.
-                Places without a robot are idle until Batch.begin().
-            record: records the trajectories, for the results.
-            viewer: observer that shows the robots, if the engine can be watched.
-            threads: number of threads that share the robots, if the engine supports threads.
-
-        Raises:
-            InputError: if the engine cannot simulate a robot.
-            SimulationFailure: if a robot fails before its first step.
-        """
-        start = functools.partial(self.alone, record=record, viewer=viewer)
-        return SerialBatch(start, robots, places or len(robots))
-
-    def alone(self, robot: DrivenRobot, *, record: bool, viewer: Viewer | None) -> LoneRobot:
-        """Puts a single robot at its start, for a SerialBatch, which simulates one robot after
-        another. Raises the errors of start()."""
-        raise NotImplementedError
-
     def simulate(
         self, robot: DrivenRobot, *, record: bool = False, viewer: Viewer | None = None
     ) -> SimulationResult:
-        """Simulates a robot to the end of its simulation. Raises Diverged or StepBudgetExceeded if
-        it fails, and InputError if the engine cannot simulate it."""
-        batch = self.start([robot], record=record, viewer=viewer)
-        batch.advance()
-        return batch.result(0)
+        """Simulates a robot from its start to the end of its simulation.
+
+        The robot follows what drives it, and changes at the times of its scenario's events. Calls
+        time_limit.check_time() often, which raises TimeBudgetExceeded.
+
+        Args:
+            robot: the robot with its gait, command, policy or controller.
+            record: records the trajectory, for the result.
+            viewer: observer that shows the robot on the engine `drake`. The others ignore it.
+
+        Raises:
+            InputError: if the engine cannot simulate the robot.
+            Diverged, StepBudgetExceeded: if the simulation fails.
+        """
+        raise NotImplementedError
 
 
 def engine_of(scenario: World) -> Engine:
@@ -91,9 +84,13 @@ def engine_of(scenario: World) -> Engine:
     return engine
 
 
+def check_engine(scenario: World, name: str, reason: str) -> None:
+    """Raises InputError unless the scenario's engine has this name. The message gives a reason."""
+    if scenario.engine_name != name:
+        problem = f"found '{scenario.engine_name}', expected '{name}': {reason}"
+        raise InputError(f"scenario {scenario.name}", "engine", problem)
+
+
 def check_can_be_watched(scenario: World) -> None:
     """Raises InputError if the scenario's engine does not support a viewer."""
-    if not engine_of(scenario).can_be_watched:
-        engine = scenario.engine_name
-        problem = f"found '{engine}', expected 'drake': no other engine can be watched"
-        raise InputError(f"scenario {scenario.name}", "engine", problem)
+    check_engine(scenario, "drake", "no other engine can be watched")

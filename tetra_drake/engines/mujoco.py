@@ -21,30 +21,27 @@ The ground must be a plane, level or inclined, or there is none.
 
 from __future__ import annotations
 
-import copy
-import dataclasses
+import itertools
 import math
-from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from tetra_drake.engines.batch import LoneRobot, Viewer
-from tetra_drake.engines.engine import Engine
-from tetra_drake.engines.lanes.tables import numbers_of, views
+from tetra_drake.engines.engine import SAME_TIME, Engine, Viewer
 from tetra_drake.engines.mjcf import check_mjcf, integrator_of, is_pulled, make_mjcf
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
+from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.kernels.compiling import compiled
-from tetra_drake.kernels.packed import Packed, unpacked, write_tables
+from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws.actuator import DRIVE, DRIVE_COLUMNS, RATE
 from tetra_drake.laws.cable import PASSIVE
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.laws.forces import Forces, Parts, compute_strut_forces, pull_of_cable
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
+from tetra_drake.robot.command import signals_of_one
 from tetra_drake.robot.equilibrium import (
     Unactuated,
     force_at_rest,
@@ -82,9 +79,11 @@ class MujocoEngine(Engine):
             raise InputError(scenario.name, "cpg.feedback", problem)
         check_mjcf(scenario)
 
-    def alone(self, robot: DrivenRobot, *, record: bool, viewer: Viewer | None) -> LoneRobot:
+    def simulate(
+        self, robot: DrivenRobot, *, record: bool = False, viewer: Viewer | None = None
+    ) -> SimulationResult:
         self.check(robot.robot.scenario)
-        return _MujocoRobot(robot, record=record)
+        return _MujocoRobot(robot, record=record).simulated()
 
 
 def is_stable(robot: Robot, step: float) -> bool:
@@ -117,16 +116,19 @@ def installed() -> bool:
     return True
 
 
-class _MujocoRobot(LoneRobot):
-    """Simulation of one robot in MuJoCo, with many steps in each call of MuJoCo."""
+class _MujocoRobot:
+    """Simulation of one robot in MuJoCo from start to end, with many steps in each call of MuJoCo.
+
+    A policy or a controller is asked between calls. After an event, the simulation goes on with
+    MuJoCo's model of the changed robot, from the same state.
+    """
 
     def __init__(self, driven: DrivenRobot, *, record: bool) -> None:
         """Raises StepBudgetExceeded if the duration has too many steps, Diverged if a step is too
         long, and InputError if MuJoCo refuses the robot."""
         import mujoco
 
-        self.first = self.driven = driven
-        self._record, self._robot = record, driven.robot
+        self._driven, self._record, self._robot = driven, record, driven.robot
         robot = self._robot
         settings, self._step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
         self._steps = max(1, round(settings.duration / self._step))
@@ -146,6 +148,8 @@ class _MujocoRobot(LoneRobot):
         self._speed_limit, self._observer = speed_limit(driven), Observer(driven)
         self._motions: list[Motion] = []
         """The motion up to the latest event, in parts."""
+        self._known = 0
+        """Number of samples in these parts."""
         of_cables = robot.structure.cables["signal"]
         self._motors = of_cables[of_cables != PASSIVE]  # index of each motor's signal
 
@@ -156,10 +160,8 @@ class _MujocoRobot(LoneRobot):
         self._signals_kept = np.tile(robot.first_signals, (count, 1))
         self._drives_kept = np.tile(self._drives, (count, 1))
 
-        self._done, self.wall_time = 0, 0.0
+        self._done, self._began = 0, 0.0
         self._before = self._held = robot.first_signals
-        self._is_held = False
-        self._began = self._paused = 0.0
 
     def _make_model(self) -> None:
         """Makes MuJoCo's model of the present robot, at its start."""
@@ -176,19 +178,52 @@ class _MujocoRobot(LoneRobot):
             raise Diverged(time=0.0, reason=f"engine.step, {self._step:g} s, {problem}")
         self._data = mujoco.MjData(self._model)
 
-    def become(self, robot: Robot, p_BC: Array) -> _MujocoRobot:
-        after = self._copied()
-        known = sum(len(motion.times) for motion in self._motions)
-        passed = int(np.searchsorted(self._times, self._paused, side="right"))
-        after._motions = [*self._motions, self._kept(slice(known, passed))]
-        after._robot = robot
-        after._make_model()
-        after._observer = Observer(dataclasses.replace(self.driven, robot=robot))
-        write_tables(after._observer.tally, self._observer.tally)
+    def simulated(self) -> SimulationResult:
+        """The result at the end of the simulation. Raises Diverged."""
+        pilot, phases = self._driven.pilot, self._driven.robot.phases
+        changes = [(b.begins, b.robot, b.p_BC - a.p_BC) for a, b in itertools.pairwise(phases)]
+        action = pilot.acts_after(0.0) if pilot else math.inf
+        end, started = self._driven.robot.scenario.simulation.duration, perf_counter()
+        try:
+            while (now := min(action, changes[0][0] if changes else end)) < end:
+                self._advance_to(now)
+                if pilot and action <= now + SAME_TIME:
+                    signals = signals_of_one(pilot, self._readings())
+                    self._before, self._held, self._began = self._held, signals, now
+                    action = pilot.acts_after(action)
+                while changes and changes[0][0] <= now + SAME_TIME:
+                    self._become(*changes.pop(0))
+            self._advance_to(end)
+        except SimulationFailure as failure:
+            failure.wall_time = perf_counter() - started
+            raise
+        wall_time = perf_counter() - started
+        return make_result(
+            self._driven,
+            Motion.joined([*self._motions, self._kept(slice(self._known, None))]),
+            totals=self._observer.tally,
+            work=IntegratorWork(
+                scheme=integrator_of(self._robot, pulled=self._pulled),
+                accuracy=self._step,
+                steps=self._steps,
+                derivative_evaluations=self._steps,
+            ),
+            wall_time=wall_time,
+            record=self._record,
+        )
+
+    def _become(self, now: float, robot: Robot, p_BC: Array) -> None:
+        """Goes on from now on (s) with another robot in place of this one, whose nodes move on in
+        the same way. The origins of its bodies' frames are at p_BC (bodies, 3) in m in the frames
+        of the old one."""
+        passed = int(np.searchsorted(self._times, now, side="right"))
+        self._motions.append(self._kept(slice(self._known, passed)))
+        self._robot, self._known = robot, passed
+        self._make_model()
+        self._observer.follow(robot)
         # The last step may end after the event, with a sample.
-        after._state = self._moved(self._state[np.newaxis], p_BC)[0]
-        after._states_kept[passed:] = self._moved(self._states_kept[passed:], p_BC)
-        return after
+        self._state = self._moved(self._state[np.newaxis], p_BC)[0]
+        self._states_kept[passed:] = self._moved(self._states_kept[passed:], p_BC)
 
     def _moved(self, states: Array, p_BC: Array) -> Array:
         """MuJoCo's states (rows, numbers) of the same motion, after the origins of the bodies'
@@ -199,29 +234,14 @@ class _MujocoRobot(LoneRobot):
         moved[:, 1 + p], moved[:, 1 + v] = after[:, 4 + p], after[:, 3 + v]
         return moved
 
-    def _copied(self) -> _MujocoRobot:
-        copied = copy.copy(self)
-        for name, value in vars(self).items():
-            if isinstance(value, Array):
-                setattr(copied, name, value.copy())
-        copied._observer = Observer(self.driven)
-        write_tables(copied._observer.tally, self._observer.tally)
-        return copied
-
-    def hold(self, signals: Array) -> None:
-        self._before, self._held, self._began = self._held, signals.copy(), self._paused
-        self._is_held = True
-
-    def advance_to(self, time: float) -> None:
+    def _advance_to(self, time: float) -> None:
         """Simulates the steps that begin before a time (s), from the present one on. Raises
         Diverged."""
         from mujoco.rollout import Rollout
 
         rounding = min(1e-6, 5e-10 / self._step)  # readings there are of this time, to 1e-9 s
         last = min(self._steps, math.ceil(time / self._step - rounding))
-        self._paused = time
         signals = self._signals_at(self._step * np.arange(self._done, last + 1))
-        started = perf_counter()
         if self._done == 0 and len(signals) > 1:
             self._signals_kept[0] = signals[0]
             start = self._body_states(self._state[np.newaxis])
@@ -249,14 +269,13 @@ class _MujocoRobot(LoneRobot):
                     at, reason = float(times[warned.argmax()]), "MuJoCo warns of instability"
                     raise Diverged(time=at, reason=reason)
                 self._done += len(states)
-        self.wall_time += perf_counter() - started
 
     def _signals_at(self, times: Array) -> Array:
         """Signals (times, m) in N at simulated times (s) (times,). No time may be before the latest
-        pause, at which the signals may have changed."""
-        if not self._is_held:
-            return self.driven.signals_at(times)
-        change = self.driven.robot.scenario.cpg.listing_step
+        action of a policy or controller."""
+        if not self._driven.pilot:
+            return self._driven.signals_at(times)
+        change = self._driven.robot.scenario.cpg.listing_step
         left = 1.0 - np.clip((times - self._began) / change, 0.0, 1.0)[:, np.newaxis]
         return self._held - left * (self._held - self._before)
 
@@ -339,7 +358,8 @@ class _MujocoRobot(LoneRobot):
         modes[:, :, CONTACT] = ground_forces[:, :, 2] > 0.0
         return Motion(times, self._body_states(states), signals, modes, drives, ground_forces)
 
-    def readings(self) -> Readings:
+    def _readings(self) -> Readings:
+        """The readings of the robot at its present time, without the axis of robots."""
         now = np.array([self._step * self._done])
         signals = self._signals_at(now)
         moment = self._motion(now, self._state[np.newaxis], signals, self._drives[np.newaxis])
@@ -357,54 +377,9 @@ class _MujocoRobot(LoneRobot):
     def _kept(self, rows: slice) -> Motion:
         """The motion of the present robot at some of the times of the samples."""
         times, signals = self._times[rows], self._signals_kept[rows]
-        if not self._is_held:  # known at the times themselves
-            signals = self.driven.signals_at(times)
+        if not self._driven.pilot:  # known at the times themselves
+            signals = self._driven.signals_at(times)
         return self._motion(times, self._states_kept[rows], signals, self._drives_kept[rows])
-
-    def motion(self) -> Motion:
-        known = sum(len(motion.times) for motion in self._motions)
-        passed = int(np.searchsorted(self._due, self._done, side="right"))
-        return Motion.joined([*self._motions, self._kept(slice(known, passed))])
-
-    def numbers(self) -> dict[str, Array]:
-        return {
-            "state": self._state,
-            "warm_start": self._data.qacc_warmstart.copy(),
-            "drives": self._drives,
-            "before": self._before,
-            "held": self._held,
-            "clock": np.array([self._done, self._paused, self._began]),
-            "tally": numbers_of(self._observer.tally),
-        }
-
-    def remember(self, motion: Motion) -> None:
-        self._motions = [motion]
-
-    def restore(self, numbers: Mapping[str, Array]) -> None:
-        self._state, self._drives = numbers["state"].copy(), numbers["drives"].copy()
-        self._before, self._held = numbers["before"].copy(), numbers["held"].copy()
-        done, self._paused, self._began = numbers["clock"].tolist()
-        self._done, self._is_held = int(done), True
-        self._data.qacc_warmstart[:] = numbers["warm_start"]
-        write_tables(self._observer.tally, views(self._observer.tally, numbers["tally"]))
-        self._motions = []
-
-    def result(self) -> SimulationResult:
-        known = sum(len(motion.times) for motion in self._motions)
-        motions = [*self._motions, self._kept(slice(known, None))]
-        return make_result(
-            self.first,
-            Motion.joined(motions),
-            totals=self._observer.tally,
-            work=IntegratorWork(
-                scheme=integrator_of(self._robot, pulled=self._pulled),
-                accuracy=self._step,
-                steps=self._steps,
-                derivative_evaluations=self._steps,
-            ),
-            wall_time=self.wall_time,
-            record=self._record,
-        )
 
 
 @compiled

@@ -17,6 +17,7 @@ from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
 from tetra_drake.laws.forces import Forces, compute_forces, move_robot
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.tally import Tally, observe, update_clearance
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 
 CLEARED = 16
@@ -35,11 +36,15 @@ class Observer:
     """
 
     def __init__(self, driven: DrivenRobot) -> None:
-        robot = driven.robot
-        model, signals = robot.model, robot.structure.signals
+        model, signals = driven.robot.model, driven.robot.structure.signals
         self.tally = Tally.of(model, signals=signals, begins=driven.steady_start)
         """Sums over all added states; see laws.tally."""
-        self._parts = Packed((model, self.tally, Forces.of(model)))
+        self.follow(driven.robot)
+
+    def follow(self, robot: Robot) -> None:
+        """Observes what an event has left of the robot, from now on."""
+        signals = robot.structure.signals
+        self._parts = Packed((robot.model, self.tally, Forces.of(robot.model)))
         state, drives = robot.structure.initial_state, robot.starting_drives()
         one = np.zeros(1), state[np.newaxis], np.zeros((1, signals)), drives[np.newaxis]
         self._observe = machine_code(observe_states, self._parts, *one)

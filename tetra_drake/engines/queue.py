@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
-from tetra_drake.engines.batch import Batch
-from tetra_drake.engines.engine import Engine, engine_of
+from tetra_drake.engines.engine import engine_of
+from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, Driver, driven_robot
@@ -40,8 +40,9 @@ class _Job:
 class SimulationQueue:
     """Queue of simulations, each of a gait or a command, that several threads run.
 
-    Each thread simulates as many robots side by side as its engine has lanes. Use the queue in a
-    `with` block; its end cancels unfinished simulations.
+    On the compiled engine, each thread simulates as many robots side by side as there are lanes; on
+    other engines, one robot after another. Use the queue in a `with` block; its end cancels
+    unfinished simulations.
     """
 
     def __init__(self, threads: int, *, record: bool = False) -> None:
@@ -136,7 +137,8 @@ def _places_for(scenario: Scenario) -> int:
 @dataclass
 class _Crew:
     """Simulations of one thread of the queue: a batch of robots, and the jobs that it simulates. A
-    job is a gait or a command on a scenario, with the future of its result."""
+    job is a gait or a command on a scenario, with the future of its result. Other engines than
+    `compiled` have no batch: a job is done as soon as it has begun."""
 
     driven: Callable[[_Job], DrivenRobot]
     """Function that makes the robot of a job."""
@@ -145,8 +147,7 @@ class _Crew:
     """Jobs by their place, the index in the batch."""
     idle: list[int] = field(default_factory=list)
     """Places (indices in the batch) without a job."""
-    engine: Engine | None = None
-    batch: Batch | None = None
+    batch: LaneBatch | None = None
 
     def begin(self, job: _Job) -> bool:
         """Puts a job into an idle place of the batch. Returns False if its robot does not fit the
@@ -154,32 +155,33 @@ class _Crew:
         gets the error."""
         try:
             robot, engine = self.driven(job), engine_of(job.scenario)
-            if self.batch and engine is self.engine and self.batch.begin(self.idle[0], robot):
-                place = self.idle.pop(0)
-            elif self.jobs:
+            fits = engine.lanes > 1 and self.batch and self.batch.begin(self.idle[0], robot)
+            if self.jobs and not fits:
                 return False
-            else:
+            if engine.lanes == 1:
+                job.future.set_result(engine.simulate(robot, record=self.record))
+                return True
+            if not fits:
                 places = _places_for(job.scenario)
-                self.batch = engine.start([robot], places=places, record=self.record)
-                self.engine, self.idle, place = engine, list(range(1, places)), 0
+                self.batch = LaneBatch(robot, places=places, record=self.record)
+                self.idle = list(range(places))
         except Exception as error:  # a gait may not fit its scenario
             job.future.set_exception(error)
             return True
         job.deadline = time.perf_counter() + job.time_budget
-        self.jobs[place] = job
+        self.jobs[self.idle.pop(0)] = job
         return True
 
     def advance(self) -> None:
-        """Simulates until a robot has ended, or for some 30 ms of wall time; other engines than
-        `compiled` simulate all to their ends. Sets the futures of finished jobs and of jobs that
-        took too long, and removes these jobs."""
+        """Simulates until a robot has ended, or for some 30 ms of wall time. Sets the futures of
+        finished jobs and of jobs that took too long, and removes these jobs."""
         batch = self.batch
         if batch is None or not self.jobs:
             return
         batch.advance(briefly=True)
-        now = time.perf_counter()
+        now, ended = time.perf_counter(), batch.ended
         for place, job in list(self.jobs.items()):
-            if batch.ended(place):
+            if ended[place]:
                 try:
                     result = batch.result(place)
                 except Exception as failure:  # the simulation may have diverged

@@ -36,18 +36,10 @@ class Sampler:
         self._latest: tuple[float, np.ndarray] | None = None
         """Time (s) and continuous state at the end of the latest step."""
 
-    def follow(self, other: Sampler) -> None:
-        """Copies the samples of another sampler."""
-        self._samples, self._next = other._samples.copy(), other._next
-
-    def go_on(self, time: float, state: np.ndarray) -> None:
-        """Continues at a time (s) from a continuous state, without the samples before."""
-        self._samples, self._latest = [], (time, state)
-        self._next = int(np.searchsorted(self._times, time, side="right"))
-
-    def remember(self, motion: Motion) -> None:
-        """Puts a motion before the samples that follow."""
-        self._samples = [motion]
+    def follow(self, other: Sampler, context: Context) -> None:
+        """Goes on as another sampler would, from the context of the diagram of a changed robot."""
+        self._samples, self._next = other._samples, other._next
+        self._latest = context.get_time(), context.get_continuous_state_vector().CopyToVector()
 
     def after_step(self, context: Context) -> None:
         """Takes the samples within the step that has just ended. `context` is the simulator's."""
@@ -74,8 +66,6 @@ class Sampler:
 
     def motion(self) -> Motion:
         """The motion up to now, at the times of the samples."""
-        if not self._samples:  # it has not begun
-            return motion_at(self._diagram, self._context).rows(slice(0))
         return Motion.joined(self._samples)
 
 

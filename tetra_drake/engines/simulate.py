@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from tetra_drake.engines.batch import Viewer
-from tetra_drake.engines.engine import check_can_be_watched, engine_of
+from tetra_drake.engines.engine import Viewer, check_can_be_watched, engine_of
 from tetra_drake.engines.queue import SimulationQueue
-from tetra_drake.engines.simulation import Controller, Simulation
-from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.command import Command, Driver, driven_robot
+from tetra_drake.robot.command import (
+    Command,
+    Controller,
+    Driver,
+    driven_robot,
+    robot_of_controller,
+)
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -43,7 +46,8 @@ def simulate(
         >>> inches, tension = result.metrics.distance_in, result.trajectory.tension
 
     The same scenario and gait always give the same numbers, bit for bit, except for the wall time.
-    Recording and watching do not change them.
+    Recording and watching do not change them. On each engine, a policy or a controller acts once in
+    each control period, and the robot changes at the events of the scenario.
 
     Args:
         scenario: a scenario, its name or file, or a run.
@@ -71,18 +75,8 @@ def simulate(
     if controller is not None:
         if gait is not None or command is not None or steering is not None:
             raise InputError("simulate", "controller", "excludes a gait, a command, and steering")
-        simulation = Simulation(
-            scenario,
-            control_period=control_period,
-            record=record,
-            viewer=viewer,
-            name=getattr(controller, "__name__", "controller"),
-        )
-        while not simulation.ended[0]:
-            check_time()
-            readings = simulation.state.rows(0)
-            simulation.step(controller(float(readings.time), readings))
-        return simulation.result()
+        robot = robot_of_controller(scenario, controller, period=control_period)
+        return engine_of(scenario).simulate(robot, record=record, viewer=viewer)
     if command is not None and (gait is not None or steering is not None):
         raise InputError("simulate", "command", "excludes a gait, and steering")
     given = gait if command is None else command
@@ -161,7 +155,5 @@ def check_scenario(scenario: Scenario) -> None:
         problem = "found no oscillator, expected at least one that drives cables"
         raise InputError(scenario.name, "robot.actuated", problem)
     robot, gait = Robot.of(scenario), seeded_gait(scenario)
-    driven = driven_robot(scenario, gait, robot=robot)
-    if driven.oscillating is not None:
-        robot.oscillators(driven.oscillating)
+    driven_robot(scenario, gait, robot=robot).oscillators  # noqa: B018
     engine_of(scenario).check(scenario)

@@ -7,29 +7,33 @@ import dataclasses
 import functools
 import hashlib
 import json
-import numbers
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.engines.batch import Batch, Viewer, checked_numbers
-from tetra_drake.engines.engine import check_can_be_watched, engine_of
+from tetra_drake.engines.engine import check_engine
+from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.engines.states import States
-from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
+from tetra_drake.errors import (
+    InputError,
+    SimulationFailure,
+    check_type,
+    check_whole,
+    checked_numbers,
+)
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.command import controlled_robot
+from tetra_drake.robot.command import checked_actions, checked_period, controlled_robot
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.events import Event, check_taken
 from tetra_drake.scenario.load import GivenScenario, dump_scenario, given_scenario
-from tetra_drake.scenario.scenario import Scenario
 
 MOST_ROBOTS = 100_000
 """Largest number of robots side by side."""
@@ -40,14 +44,12 @@ Indices = Sequence[int] | np.ndarray | None
 _UNDISTURBED = json.dumps({"seed": None, "damage": []})
 """Identity of a robot without disturbances and damage; see Simulation._robot_of()."""
 
-Controller = Callable[[float, Readings], npt.ArrayLike]
-"""Function from the time (s) and the readings of one robot to its actions (actions,)."""
-
 
 class Simulation:
-    """Robots side by side that a program controls: it reads them and sets their actuators.
+    """Robots side by side that a program controls: it reads them and sets their actuators. The
+    compiled engine simulates them.
 
-        >>> simulation = td.Simulation(td.load_scenario("quick"), count=4)
+        >>> simulation = td.Simulation(td.load_scenario("coulomb"), count=4)
         >>> driven, readings = simulation.robot.driven, simulation.reset(seed=1)
         >>> while not simulation.ended.all():
         ...     readings = simulation.step(simulation.rest + 3.0 * readings.rates[:, driven])
@@ -58,7 +60,7 @@ class Simulation:
     order is the same as in `robot.driven`, oscillator by oscillator. An action is held for a
     control period. Like a sample of a command, it begins with a linear change from the last action
     that takes one `cpg.listing_step`; the first action acts from the start on. There is no network
-    and no start-up time. On all engines, steps with the samples of a command give the motion of
+    and no start-up time. Steps with the samples of a command give the motion of
     simulate(command=...), if each sample differs from the one before.
 
     One thread at a time may use a simulation. If a step is interrupted, as by Ctrl-C, reset() puts
@@ -73,26 +75,26 @@ class Simulation:
         count: int = 1,
         control_period: float | None = None,
         record: bool = False,
-        viewer: Viewer | None = None,
         workers: int | None = None,
         name: str = "controller",
     ) -> None:
         """Puts robots at their start; see reset().
 
         Args:
-            scenario: a scenario, its name or file, or a run.
+            scenario: a scenario of the compiled engine, its name or file, or a run.
             count: number N of robots.
             control_period: time (s) between actions, a multiple of `cpg.listing_step`; by default
                 `simulation.control_period`.
             record: records the trajectories, for result().
-            viewer: observer that shows the robot, if the engine can be watched.
             workers: number of threads; one per core by default.
             name: name of the results.
 
         Raises:
-            InputError: if an argument does not fit the scenario.
+            InputError: if an argument does not fit the scenario, or its engine is another one.
         """
         self.scenario = scenario = given_scenario(scenario)
+        advice = "use on_engine('compiled'), or simulate(controller=...)"
+        check_engine(scenario, "compiled", f"no other engine steps robots; {advice}")
         self.robot: Robot = controlled_robot(scenario)
         """The robot without disturbances. Its structure has the names of nodes and cables."""
         self._first_readings = first_readings(self.robot)
@@ -100,18 +102,17 @@ class Simulation:
         threads = threads_for(workers, source="Simulation")
         check_type("Simulation", "record", record, bool)
         check_type("Simulation", "name", name, str)
-        if viewer is not None:
-            check_can_be_watched(scenario)
-        self._listing_steps = _listing_steps(control_period, scenario)
-        self.control_period = self._listing_steps * scenario.cpg.listing_step
+        self.control_period = checked_period(control_period, scenario)
         """Time (s) between actions."""
+        self._listing_steps = round(self.control_period / scenario.cpg.listing_step)
         self.count = count
         """Number of robots."""
         self._name, self._record = name, record
         self._robots, self._identities = [self.robot] * count, [_UNDISTURBED] * count
-        start = functools.partial(engine_of(scenario).start, places=count, threads=threads)
-        self._new_batch = functools.partial(start, record=record, viewer=viewer)
-        self._batch: Batch = self._new_batch([self._driven(self.robot)])
+        self._new_batch = functools.partial(
+            LaneBatch, self._driven(self.robot), places=count, record=record, threads=threads
+        )
+        self._batch = self._new_batch()
         self._owner, self._is_whole = threading.RLock(), True
         shape = count, self.robot.driven.size
         self._law: Any = CableLaw._make(np.empty((len(CableLaw._fields), *shape)))
@@ -137,8 +138,7 @@ class Simulation:
     @property
     def ended(self) -> np.ndarray:
         """True for each robot (N,) that has failed, or reached `simulation.duration`."""
-        failed = np.array([failure is not None for failure in self.failures])
-        return failed | (self._time_after(self._steps) >= self.scenario.simulation.duration)
+        return self._batch.ended
 
     def reset(
         self,
@@ -173,7 +173,7 @@ class Simulation:
                 identities = [json.dumps({"seed": each, "damage": []}) for each in seeds]
             robots = [self._robot_of(identity) for identity in identities]
             if not self._is_whole:
-                self._batch = self._new_batch([self._driven(self.robot)])
+                self._batch = self._new_batch()
             self._is_whole = False
             for place, identity, robot in zip(places, identities, robots, strict=True):
                 self._put(place, identity, robot)
@@ -203,22 +203,17 @@ class Simulation:
             goes[self._places(indices)] = True
             goes &= [failure is None for failure in self.failures]
             given = checked_actions(actions, self.rest.shape, source="Simulation")
-            if (bad := goes[:, np.newaxis] & ~np.isfinite(given)).any():
-                place, action = np.argwhere(bad)[0].tolist()
-                key = f"actions[{place}], {self.robot.structure.oscillators[action]}"
-                problem = f"found {given[place, action]}, expected a number"
-                raise InputError("Simulation", key, problem)
+            given[~goes] = 0.0
+            checked_actions(given, given.shape, source="Simulation", finite=True)
             if (late := goes & self.ended).any():
                 end = f"the end at {self.scenario.simulation.duration:g} s"
                 problem = f"robot {late.argmax()} has reached {end}; reset it"
                 raise InputError("Simulation", "step", problem)
 
             signals = np.asarray(self.scenario.actuation.signals(given, self._law))
-            signals = np.where(goes[:, np.newaxis], signals, 0.0)
             for place in np.flatnonzero(goes & (self._steps == 0)).tolist():
-                first_signals = signals[place].copy()
-                robot = dataclasses.replace(self._robots[place], first_signals=first_signals)
-                self._begin(place, self._driven(robot))
+                robot, first = self._robots[place], signals[place].copy()
+                self._begin(place, self._driven(dataclasses.replace(robot, first_signals=first)))
             self._is_whole = False
             self._batch.advance(np.where(goes, self._time_after(self._steps + 1), 0.0), signals)
             self._steps[goes] += 1
@@ -239,7 +234,7 @@ class Simulation:
     def save(self, places: Indices = None, *, history: bool = False) -> States:
         """States of robots, from which they or others can go on; see restore() and States.
 
-            >>> simulation = td.Simulation(td.load_scenario("quick"))
+            >>> simulation = td.Simulation(td.load_scenario("coulomb"))
             >>> now = simulation.save()
             >>> pull = simulation.rest + 3.0
             >>> one = simulation.step(pull)
@@ -262,16 +257,9 @@ class Simulation:
         check_type("Simulation", "history", history, bool)
         with self._used("save"):
             for place in which:
-                if history and not self._batch.has_history[place]:
-                    problem = f"robot {place} was restored without its motion before"
-                    raise InputError("Simulation", "history", problem)
                 if self._steps[place] == 0:
                     self._begin(place, self._driven(self._robots[place]))
             tables = self._batch.save(which, history=history)
-            failures = [self.failures[place] for place in which]
-            if any(failures):
-                told = [each and [type(each).__name__, each.time, each.reason] for each in failures]
-                tables["failures"] = np.array([json.dumps(each) for each in told])
             return States(
                 scenario=self.scenario.name,
                 identity=self._identity,
@@ -283,10 +271,8 @@ class Simulation:
     def restore(self, states: States, places: Indices = None) -> Readings:
         """Puts robots into saved states, and returns the readings of all robots.
 
-        On the compiled engine a restored robot goes on bit for bit as if it had not stopped, in any
-        place, also of another simulation of the same scenario. On the diagram its integrator begins
-        anew, so motions differ as after another rounding, by some micrometres at first. On MuJoCo
-        they are equal to 1e-9 m.
+        A restored robot goes on bit for bit as if it had not stopped, in any place, also of another
+        simulation of the same scenario.
 
         Args:
             states: states of save(): one for each robot, or a single one for all.
@@ -326,14 +312,7 @@ class Simulation:
                     self._put(place, identity, robots[identity])
                 if is_other or self._steps[place] == 0 or self.failures[place]:
                     self._begin(place, driven[identity])
-            told = [json.loads(str(each)) for each in own.get("failures", ["null"] * count)]
-            well = np.array([each is None for each in told], dtype=bool)
-            going = own if well.all() else {name: table[well] for name, table in own.items()}
-            self._batch.restore(np.array(which)[well].tolist(), going)
-            for row in np.flatnonzero(~well).tolist():
-                last = Readings(*(own[f"readings.{name}"][row] for name in Readings._fields))
-                self._batch.readings.put(which[row], last)
-                self._batch.failures[which[row]] = _failure_of(*told[row])
+            self._batch.restore(which, own)
             self._steps[which] = steps
             self._is_whole = True
             return self.state
@@ -341,7 +320,7 @@ class Simulation:
     def copy(self, place: int, *, to: Indices, history: bool = False) -> Readings:
         """Puts robots into the state of robot number `place`, and returns the readings of all.
 
-            >>> simulation = td.Simulation(td.load_scenario("quick"), count=8)
+            >>> simulation = td.Simulation(td.load_scenario("coulomb"), count=8)
             >>> one = simulation.step(simulation.rest, indices=[0])
             >>> readings = simulation.copy(0, to=range(1, 8))
 
@@ -358,7 +337,7 @@ class Simulation:
     def damage(self, place: int, *, cables: Sequence[str]) -> None:
         """Cuts cables of a robot now, like an event of a scenario.
 
-            >>> simulation = td.Simulation(td.load_scenario("quick"))
+            >>> simulation = td.Simulation(td.load_scenario("coulomb"))
             >>> one = simulation.step(simulation.rest)
             >>> simulation.damage(0, cables=["T1-T2 outer top"])
 
@@ -392,8 +371,8 @@ class Simulation:
         return [name for _, cut in json.loads(self._identities[place])["damage"] for name in cut]
 
     def assume(self, readings: Readings, *, place: int = 0) -> None:
-        """Puts a robot of the compiled engine into the motion of given readings, for example of a
-        robot on another engine, or of a real one.
+        """Puts a robot into the motion of given readings, for example of a robot on another engine,
+        or of a real one.
 
         The readings have no axis of robots, and a time that is a multiple of the control period.
         Positions and velocities are as in the readings. The contact nodes that touch the ground
@@ -401,8 +380,7 @@ class Simulation:
         actuators keep the states that they have.
 
         Raises:
-            InputError: if the engine or the robot is another one, or the index or the time is
-                wrong.
+            InputError: if the robot is another one, or the index or the time is wrong.
         """
         (place,) = self._places([place])
         for name, given, own in zip(Readings._fields, readings, self._batch.readings, strict=True):
@@ -438,8 +416,7 @@ class Simulation:
             self._owner.release()
 
     def _driven(self, robot: Robot) -> DrivenRobot:
-        samples = robot.first_signals[np.newaxis]
-        return DrivenRobot(robot=robot, name=self._name, samples=samples)
+        return DrivenRobot(robot=robot, name=self._name, samples=robot.first_signals[np.newaxis])
 
     @functools.cached_property
     def _identity(self) -> str:
@@ -512,37 +489,6 @@ def _damaged(robot: Robot, at: float, cables: Sequence[str]) -> Robot:
     return dataclasses.replace(robot, scenario=robot.scenario.with_sections(events=events))
 
 
-def _failure_of(kind: str, time: float, reason: str) -> SimulationFailure:
-    """The failure of a kind, as saved states name it."""
-    kinds = {each.__name__: each for each in SimulationFailure.__subclasses__()}
-    return kinds[kind](time=time, reason=reason)
-
-
 def is_list(values: object) -> TypeGuard[Sequence[Any]]:
     """True if a value is a list, a tuple, or a NumPy array of one dimension."""
     return isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.ndim == 1)
-
-
-def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: str) -> np.ndarray:
-    """Converts actions to an array of `shape` (N, actions); for a single robot they may be
-    (actions,). Raises InputError, which names `source`, if they have another shape, or are not real
-    numbers."""
-    least = shape[1:] if shape[0] == 1 else shape
-    return checked_numbers(actions, least, shape, source=source, key="actions").reshape(shape)
-
-
-def _listing_steps(period: float | None, scenario: Scenario) -> int:
-    """Number of steps of `cpg.listing_step` in a control period (s), by default the scenario's.
-    Raises InputError unless it is a whole number, or if the period is longer than the
-    simulation."""
-    source, key, step = "Simulation", "control_period", scenario.cpg.listing_step
-    if period is None:
-        period = scenario.simulation.control_period
-        source, key = f"scenario {scenario.name}", "simulation.control_period"
-    is_number = isinstance(period, numbers.Real) and not isinstance(period, bool)
-    within = is_number and 0.0 < period <= max(scenario.simulation.duration, step)
-    steps = round(period / step) if within else 0
-    if steps < 1 or abs(period - steps * step) > 1e-6 * step:
-        expected = f"a multiple of cpg.listing_step, {step:g} s, up to simulation.duration"
-        raise InputError(source, key, f"found {period!r:.60}, expected {expected}")
-    return steps

@@ -25,7 +25,7 @@ MOST_BYTES_OF_STATES = 4 * 2**30
 class States:
     """States of N robots at an instant, from which simulations go on; see Simulation.save().
 
-        >>> simulation = td.Simulation(td.load_scenario("quick"), count=2)
+        >>> simulation = td.Simulation(td.load_scenario("coulomb"), count=2)
         >>> readings = simulation.step(simulation.rest)
         >>> states = simulation.save()
         >>> states.save_npz("states.npz")

@@ -174,6 +174,10 @@ class _File(Section):
     units: str = ""
 
 
+_SAME = ("run", "seed", "versions", "thinned", "reevaluate", "units")
+"""Keys of manifest.json that are fields of a Manifest."""
+
+
 def read_manifest(directory: Path) -> Manifest:
     """Reads the manifest of a run. Raises InputError if it is missing or damaged, or if a plug-in
     is missing that the run used."""
@@ -186,17 +190,8 @@ def read_manifest(directory: Path) -> Manifest:
     scenario = load_scenario(scenario_file)
     if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):
         raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
-    method = Method(file.objective, file.optimizer)
-    manifest = Manifest(
-        scenario,
-        file.seed,
-        file.versions,
-        method,
-        file.run,
-        file.thinned,
-        file.reevaluate,
-        file.units,
-    )
+    same = {name: getattr(file, name) for name in _SAME}
+    manifest = Manifest(scenario, method=Method(file.objective, file.optimizer), **same)
     if file.sha256 != manifest.digest:
         raise InputError(path, "sha256", "does not fit the other keys: they were changed")
     return manifest
@@ -206,14 +201,10 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
     """Writes scenario.yaml and then manifest.json, which makes the directory a run."""
     file = _File(
         schema=SCHEMA,
-        run=manifest.run,
-        seed=manifest.seed,
-        versions=dict(manifest.versions),
         scenario_sha256=_sha256(save_scenario(directory, manifest.scenario)),
-        **vars(manifest.method),
         sha256=manifest.digest,
-        reevaluate=manifest.reevaluate,
-        units=manifest.units,
+        **vars(manifest.method),
+        **{name: getattr(manifest, name) for name in _SAME},
     )
     content = file.model_dump(by_alias=True, exclude_defaults=True)
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")

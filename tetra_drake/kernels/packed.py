@@ -82,16 +82,6 @@ def allocate(kind: type[NamedTupleT], sizes: Mapping[str, int]) -> NamedTupleT:
     return kind(*fields)
 
 
-def write_tables(to: NamedTupleT, source: NamedTupleT) -> None:
-    """Copies the numbers of `source` into the tables of `to`, in place. Both are NamedTuples of
-    tables of equal shapes."""
-    for ours, theirs in zip(to, source, strict=True):
-        if isinstance(ours, tuple):
-            write_tables(ours, theirs)
-        else:
-            ours[...] = theirs
-
-
 class PackedKind(types.Type):
     """Numba type of a Packed in a kernel: the address of the 64-bit words that hold its values.
 

@@ -336,8 +336,8 @@ class HuntCrossley(Section):
     stiffness: Stiffness = Field(gt=0)
     """Stiffness k of a contact: force divided by depth of the overlap."""
     dissipation: InverseSpeed = Field(ge=0)
-    """Hunt-Crossley dissipation c, defined as in Drake. It lowers the restitution e of an impact at
-    a low speed v: e = 1 - 2/3 c v."""
+    """Hunt-Crossley dissipation c, as Drake defines it. The restitution of an impact at a low speed
+    v is 1 - 2/3 c v."""
 
     def law(self, search: StrutSearch) -> StrutContactLaw:
         """Law for the kernels, with these settings as constants. `search` has the constants of the

@@ -13,45 +13,42 @@ modes and Forces. A constant of the robot is a field of Senses, which robot.robo
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from tetra_drake.kernels.compiling import compiled, inlined
-from tetra_drake.kernels.lanes import Table, named
+from tetra_drake.kernels.lanes import Real, Table, named
 from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws import cable, contact
 from tetra_drake.laws.forces import Forces, compute_forces_at
 from tetra_drake.laws.model import Model
-from tetra_drake.settings.section import Section
 
 
-class Gains(Section):
-    """Gain of each pathway of feedback in a gait, in units of the tonic input u0 of the neurons.
+class Gains(NamedTuple):
+    """Gain of each pathway of feedback in a gait, in units of the tonic input u0. Each oscillator
+    has two inputs: of its extensor and its flexor.
 
     The *body in front* of an oscillator is the last body, in the robot's order, that its cables
     join.
     """
 
-    length: float = 0.0
+    length: Real = 0.0
     """Gain of the mean relative elongation of the oscillator's cables, measured from their lengths
     in equilibrium: + on the extensor, - on the flexor."""
-    load: float = 0.0
+    load: Real = 0.0
     """Gain of the share of the robot's weight on the feet of the body in front: + on both
-    neurons."""
-    pitch: float = 0.0
+    inputs."""
+    pitch: Real = 0.0
     """Gain of the sine of the angle by which the x axis of the body in front points up: + on the
     extensor, - on the flexor."""
 
 
-PATHWAYS = tuple(Gains.model_fields)
+PATHWAYS = Gains._fields
 """Names of the feedback pathways. Arrays of gains have this order."""
 
 if TYPE_CHECKING:
     Pathway = str
-    NamedGains: Any
 else:
     Pathway = Literal[PATHWAYS]
-    NamedGains = namedtuple("NamedGains", PATHWAYS)
 
 
 class Senses(NamedTuple):
@@ -87,7 +84,7 @@ def sense(
     and ground forces. `gains` are in the order of PATHWAYS. `modes` (contacts, 12) are the contact
     modes, for further pathways; no present one uses them.
     """
-    gain = named(NamedGains, gains)
+    gain = named(Gains, gains)
     for i in range(feedback.size):
         feedback[i] = 0.0
     for i in range(senses.drivers.size):

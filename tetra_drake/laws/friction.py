@@ -232,8 +232,7 @@ class ResetIntegrator(FrictionKind):
     """Tangents along which a node breaks free: `each` by itself, or `both` as soon as the
     deflection along one reaches the stiction range."""
     load: ForceQuantity | None = Field(default=None, gt=0)
-    """Normal force for which the other settings are given: friction is proportional to the normal
-    force. Without `load`, friction does not depend on it."""
+    """Normal force for which the other settings are given, if friction is proportional to it."""
 
     def law(self) -> FrictionLaw:
         same = {name: value for name, value in self if name in ResetConstants._fields}

@@ -12,9 +12,7 @@ as in the thesis's listing B.2. The output of an oscillator is y_extensor - y_fl
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Annotated, NamedTuple, Self
 
 import numpy as np
@@ -23,6 +21,7 @@ from pydantic import Field
 
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Table, maximum
+from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.oscillator import (
     OUTPUT,
     RATE,
@@ -31,6 +30,7 @@ from tetra_drake.laws.oscillator import (
     GaitBounds,
     GaitParameter,
     OscillatorFunctions,
+    Oscillators,
     Wiring,
 )
 
@@ -47,47 +47,29 @@ _ANY = GaitBounds(weight_min=0.0, weight_max=0.0, tau_a_min=LEAST_TAU, tau_a_max
 """Bounds where no gaits are random."""
 
 
-@dataclass(frozen=True)
-class Weights:
-    """Connections between the oscillators of a robot. A gait has a weight for each connection."""
+def connections(wiring: Wiring, reach: int | None) -> np.ndarray:
+    """Indices of the two neurons of each weight (weights, 2): the inhibited one, then the
+    inhibiting one. The neurons 2k and 2k + 1 are extensor and flexor of oscillator k. With `reach`,
+    only oscillators at most this far apart are connected; see Blueprint.distances.
 
-    wiring: Wiring
-    reach: int | None
-    """Largest distance between oscillators that inhibit each other, counted in steps between
-    oscillators that share a body; None for no limit."""
+    Weights are sorted by inhibited neuron, then by inhibiting neuron, as in listing B.2 of the
+    thesis. Both neurons of a weight have the same kind.
+    """
+    kind = np.arange(2 * wiring.signals) % 2
+    connected = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
+    if reach is not None:
+        connected &= np.kron(wiring.distances, np.ones((2, 2))) <= reach
+    return np.argwhere(connected)
 
-    @functools.cached_property
-    def couplings(self) -> np.ndarray:
-        """Indices of the two neurons of each weight (weights, 2): the inhibited one, then the
-        inhibiting one. The neurons 2k and 2k + 1 are extensor and flexor of oscillator k.
 
-        Weights are sorted by inhibited neuron, then by inhibiting neuron, as in listing B.2 of the
-        thesis. Both neurons of a weight have the same kind.
-        """
-        kind = np.arange(2 * self.wiring.signals) % 2
-        coupled = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
-        if self.reach is not None:
-            coupled &= np.kron(self.wiring.distances, np.ones((2, 2))) <= self.reach
-        return np.argwhere(coupled)
-
-    @functools.cached_property
-    def images(self) -> np.ndarray:
-        """Index of the mirror image of each weight (weights,): the weight between the oscillators
-        on the robot's other side, left and right exchanged. A weight without an image has its own
-        index."""
-        images = self.wiring.images
-        opposite = [k if image is None else image for k, image in enumerate(images)]
-        neurons = np.add.outer(2 * np.array(opposite, dtype=int), [0, 1]).ravel()
-        index = {(i, j): weight for weight, (i, j) in enumerate(self.couplings.tolist())}
-        pairs = neurons[self.couplings].tolist()
-        return np.array([index.get((i, j), w) for w, (i, j) in enumerate(pairs)], dtype=int)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the weights: with "3->1 extensor", the extensor of oscillator 3 inhibits the
-        extensor of oscillator 1. Oscillators are counted from 1."""
-        pairs = self.couplings.tolist()
-        return tuple(f"{j // 2 + 1}->{i // 2 + 1} {NEURONS[i % 2]}" for i, j in pairs)
+def weight_names(pairs: np.ndarray, oscillators: Sequence[int]) -> list[str]:
+    """Names of the weights between pairs of neurons, see connections(), of `oscillators`. With
+    "weight 3->1 extensor", the extensor of oscillator 3 inhibits the extensor of oscillator 1.
+    Oscillators are counted from 1 in names."""
+    return [
+        f"weight {oscillators[j // 2] + 1}->{oscillators[i // 2] + 1} {NEURONS[i % 2]}"
+        for i, j in pairs.tolist()
+    ]
 
 
 class Network(NamedTuple):
@@ -117,12 +99,10 @@ class Network(NamedTuple):
         tau_a: npt.ArrayLike,
         tau_b: npt.ArrayLike,
         self_inhibition_weight: npt.ArrayLike,
-        connected: np.ndarray | None = None,
     ) -> Self:
         """A network from its weights `inhibition` (2n, 2n), of neuron i by neuron j, its time
         constants tau_A and tau_B (s), and the weight beta of its self-inhibition. These three are
-        one number, or one per neuron. `connected` (2n, 2n) is true for pairs with a connection; by
-        default where weights are not 0.
+        one number, or one per neuron. A weight is NaN where there is no connection.
 
         Raises ValueError if the shape of `inhibition` is not (2n, 2n), or a time constant is not
         above 0.
@@ -133,7 +113,7 @@ class Network(NamedTuple):
         for name, tau in (("tau_a", tau_a), ("tau_b", tau_b)):
             if not np.all(np.asarray(tau) > 0.0):
                 raise ValueError(f"found {tau!r} s as {name}, expected more than 0")
-        neurons, onto = len(matrix), matrix != 0.0 if connected is None else connected
+        neurons, onto = len(matrix), ~np.isnan(matrix)
         return cls(
             first=np.concatenate([[0], onto.sum(axis=1).cumsum()]).astype(np.int64),
             source=onto.nonzero()[1].astype(np.int64),
@@ -208,13 +188,15 @@ class Matsuoka(CpgKind):
         """Weights, gains of the feedback, and time constants. Floors are from listing A.3 of the
         thesis."""
         bounds = bounds or _ANY
-        weights, low = Weights(wiring, self.reach), bounds.tau_a_min
-        names = [f"weight {name}" for name in weights.names]
+        pairs, low = connections(wiring, self.reach), bounds.tau_a_min
+        names = images = weight_names(pairs, range(wiring.signals))
+        if bounds.mirrored:
+            opposite = [i if k is None else k for i, k in enumerate(wiring.images)]
+            images = weight_names(pairs, opposite)
         weight = GaitParameter(bounds.weight_min, bounds.weight_max, floor=0.0, least=0.0)
-        found = dict.fromkeys(names, weight)
-        for place, image in enumerate(weights.images.tolist() if bounds.mirrored else ()):
-            if image < place:
-                found[names[place]] = weight._replace(copies=names[image])
+        found: dict[str, GaitParameter] = {}
+        for name, image in zip(names, images, strict=True):
+            found[name] = weight._replace(copies=image) if image in found else weight
         tau = GaitParameter(low, bounds.tau_a_max, floor=low, least=LEAST_TAU, unit="s")
         follower = tau._replace(
             **{key: TAU_B_PER_TAU_A * getattr(tau, key) for key in ("low", "high", "floor")},
@@ -224,26 +206,22 @@ class Matsuoka(CpgKind):
         )
         return found | self.gain_parameters() | {"tau_A": tau, "tau_B": follower}
 
-    def constants(self, wiring: Wiring, gait: Mapping[str, float]) -> Network:
-        """The network that a gait gives a robot."""
-        neurons, weights = np.arange(2 * wiring.signals), Weights(wiring, self.reach)
+    def network(self, wiring: Wiring, gait: Mapping[str, float]) -> tuple[Network, np.ndarray]:
+        neurons, pairs = np.arange(2 * wiring.signals), connections(wiring, self.reach)
         inhibition = np.full((neurons.size, neurons.size), np.nan)
         inhibition[neurons, neurons ^ 1] = self.partner_weight
-        inhibition[tuple(weights.couplings.T)] = [gait[f"weight {name}"] for name in weights.names]
-        return Network.of(
+        names = weight_names(pairs, range(wiring.signals))
+        inhibition[tuple(pairs.T)] = [gait[name] for name in names]
+        network = Network.of(
             inhibition,
             tau_a=gait["tau_A"],
             tau_b=gait["tau_B"],
             self_inhibition_weight=self.self_inhibition_weight,
-            connected=~np.isnan(inhibition),
         )
-
-    def starting_state(self, wiring: Wiring, gait: Mapping[str, float]) -> np.ndarray:
-        """Inner states u of all neurons at t = 0, then their self-inhibitions v."""
-        inner_state, of_extensors, of_flexors = self.initial_state
-        u = np.full(2 * wiring.signals, inner_state)
-        return np.concatenate([u, np.tile([of_extensors, of_flexors], wiring.signals)])
+        u, *v = self.initial_state
+        return network, np.append(np.full(neurons.size, u), np.tile(v, wiring.signals))
 
 
-NO_NETWORK = Network.of(np.zeros((0, 0)), tau_a=1.0, tau_b=1.0, self_inhibition_weight=0.0)
-"""Network without neurons, for robots whose signals are given."""
+_NONE = Network.of(np.zeros((0, 0)), tau_a=1.0, tau_b=1.0, self_inhibition_weight=0.0)
+NO_OSCILLATORS = Oscillators(Matsuoka.own, _NONE, np.zeros(0), np.zeros(len(PATHWAYS)))
+"""For robots whose signals are given."""

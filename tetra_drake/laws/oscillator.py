@@ -2,9 +2,9 @@
 
 A kind is a section of settings that derives from CpgKind, with two functions for kernels: the rates
 of its states, and its outputs. To add a kind, write one file such as laws.phase, with settings,
-parameters(), constants(), starting_state() and an OscillatorFunctions. All engines, the diagram's
+parameters(), network() and an OscillatorFunctions. All engines, the diagram's
 LeafSystem and searches take everything from there. A plug-in names the class by an entry point; the
-package's own kinds are in scenario.world.Cpg.
+package's own kinds are in scenario.world.
 
 Each oscillator has two inputs, which are tonic input plus feedback. A Matsuoka oscillator has two
 neurons for them. Feedback with opposite signs on both shifts or entrains the oscillator; feedback
@@ -57,16 +57,7 @@ class GaitParameter(NamedTuple):
     coupled: bool = True
     """True if evolved gaits have this ratio, too."""
     default: float | None = None
-    """Value if a gait file does not have it."""
-
-    @property
-    def has_default(self) -> bool:
-        """True if a gait file need not have it."""
-        return bool(self.leader) or self.default is not None
-
-    def default_among(self, values: Mapping[str, float]) -> float:
-        """Value if a gait file does not have it, by the values of earlier parameters."""
-        return self.ratio * values[self.leader] if self.leader else self.default or 0.0
+    """Value if a gait does not have it. One that follows another has `ratio` times its value."""
 
 
 class GaitBounds(Section):
@@ -130,6 +121,10 @@ class Oscillators(NamedTuple):
     own: OscillatorFunctions
     constants: Any
     """NamedTuple of tables."""
+    start: Table
+    """States (s,) at t = 0."""
+    gains: Table
+    """Gains of the feedback, in the order of laws.feedback.PATHWAYS."""
 
 
 class CpgKind(Section):
@@ -141,13 +136,12 @@ class CpgKind(Section):
     """True if gaits can be the same on the left and on the right (`gait_bounds.mirrored`)."""
     gain: ForceQuantity
     """Signal (a force) of an oscillator per unit of its output."""
-    start_up: Time = Field(ge=0)
+    start_up: Time = Field(default=1.25, ge=0)
     """Time until which the cables are not actuated."""
-    signals: Literal["listing", "live"]
+    signals: Literal["listing", "live"] = "live"
     """How the signals are computed. `listing`: before the simulation, by forward Euler, as in the
-    thesis's listing. `live`: the network is integrated together with the robot. Feedback needs
-    `live`."""
-    listing_step: Time = Field(ge=1e-6)
+    thesis's listing. `live`: integrated with the robot, as feedback needs it."""
+    listing_step: Time = Field(default=5e-4, ge=1e-6)
     """Time step of signals that are computed beforehand."""
     feedback: list[Pathway] = Field(default=[])
     """Pathways of feedback; their gains are parameters of the gait."""
@@ -180,13 +174,10 @@ class CpgKind(Section):
         of random gaits; None where no gait is random."""
         raise NotImplementedError
 
-    def constants(self, wiring: Wiring, gait: Mapping[str, float]) -> Any:
-        """NamedTuple of tables that the functions `own` get, from the parameters of a gait. Tables
-        of integers are the same for all gaits of a robot."""
-        raise NotImplementedError
-
-    def starting_state(self, wiring: Wiring, gait: Mapping[str, float]) -> np.ndarray:
-        """States (s,) of the oscillators at t = 0."""
+    def network(self, wiring: Wiring, gait: Mapping[str, float]) -> tuple[Any, np.ndarray]:
+        """The oscillators that the parameters of a gait give a robot: a NamedTuple of tables that
+        the functions `own` get, and the states (s,) at t = 0. Tables of integers are the same for
+        all gaits of a robot."""
         raise NotImplementedError
 
 
@@ -197,10 +188,10 @@ outputs_of = cast(Callable[[Oscillators, Table, Table], None], with_own("outputs
 """outputs_of(oscillators, states, outputs); see OscillatorFunctions."""
 
 
-def make_states(values: np.ndarray) -> np.ndarray:
-    """New table `states` (s, 5) for the kernels, with values (s,). The other columns are 0."""
-    states = np.zeros((values.size, STATE_COLUMNS))
-    states[:, VALUE] = values
+def make_states(oscillators: Oscillators) -> np.ndarray:
+    """New table `states` (s, 5) for the kernels, at t = 0. The other columns are 0."""
+    states = np.zeros((oscillators.start.size, STATE_COLUMNS))
+    states[:, VALUE] = oscillators.start
     return states
 
 
@@ -247,9 +238,11 @@ def state_signals(parts: StateParts, values: Table, gain: float, signals: Table)
 @inlined
 def euler_step(oscillators: Oscillators, inputs: Table, step: Real, states: Table) -> None:
     """Integrates oscillators by one step (s) of the forward Euler method, as in listing B.1 of the
-    thesis. Updates the table `states` (s, 5). `inputs` (2n,) are constant."""
+    thesis, which updates the table `states` (s, 5). `inputs` (2n,) are those at its beginning. Also
+    the first half of a step of Heun's method (order 2); correct_states() is the second half."""
     rates(oscillators, inputs, states)
     for i in range(states.shape[0]):
+        states[i, START], states[i, SUM] = states[i, VALUE], states[i, RATE]
         states[i, VALUE] += step * states[i, RATE]
 
 
@@ -294,21 +287,10 @@ def write_outputs(
 
 
 @inlined
-def predict_states(oscillators: Oscillators, inputs: Table, step: Real, states: Table) -> None:
-    """First half of a step (s) of Heun's method (order 2): an Euler step that updates the table
-    `states` (s, 5). `inputs` (2n,) are taken at the beginning of the step. correct_states() is the
-    second half."""
-    rates(oscillators, inputs, states)
-    for i in range(states.shape[0]):
-        states[i, START], states[i, SUM] = states[i, VALUE], states[i, RATE]
-        states[i, VALUE] += step * states[i, RATE]
-
-
-@inlined
 def correct_states(
     oscillators: Oscillators, inputs: Table, step: Real, accepted: Truth, states: Table
 ) -> None:
-    """Second half of a step (s) of Heun's method, after predict_states(). `inputs` (2n,) are taken
+    """Second half of a step (s) of Heun's method, after euler_step(). `inputs` (2n,) are taken
     at the end of the step. In lanes where `accepted` is false, the states return to their values at
     the beginning of the step; each lane is a robot."""
     rates(oscillators, inputs, states)

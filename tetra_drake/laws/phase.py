@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Table, sine
@@ -31,10 +31,7 @@ from tetra_drake.laws.oscillator import (
     OscillatorFunctions,
     Wiring,
 )
-from tetra_drake.settings.quantities import Angle, Frequency, Rate, Time
-from tetra_drake.settings.refusals import refuse
-
-PAIR = Field(min_length=2, max_length=2)
+from tetra_drake.settings.quantities import PAIR, Angle, Frequency, InverseTime
 
 
 class PhaseConstants(NamedTuple):
@@ -80,7 +77,7 @@ def phase_outputs(states: Table, outputs: Table, law: PhaseConstants) -> None:
         outputs[k] = states[outputs.size + k, VALUE] * sine(states[k, VALUE] + 0.5 * math.pi)
 
 
-class Phase(CpgKind):
+class PhaseOscillators(CpgKind):
     """Settings of phase oscillators with controlled amplitudes. Frequency, amplitudes, lags and
     coupling are parameters of a gait; here are their bounds in random gaits, and equal bounds fix
     them. With fixed amplitudes, common lags and a fixed coupling, a gait is a travelling sine.
@@ -89,32 +86,24 @@ class Phase(CpgKind):
     through 0 at the start-up time.
     """
 
+    tag = "Phase"
     own = OscillatorFunctions(PhaseConstants, phase_rates, phase_outputs)
 
-    start_up: Time = Field(default=1.25, ge=0)
-    signals: Literal["listing", "live"] = "live"
-    listing_step: Time = Field(default=5e-4, ge=1e-6)
-    frequency: Annotated[list[Annotated[Frequency, Field(ge=0)]], PAIR] = Field(default=[0.3, 1.2])
+    frequency: Annotated[list[Annotated[Frequency, Field(ge=0)]], *PAIR] = Field(default=[0.3, 1.2])
     """Bounds of the frequency of all oscillators."""
-    amplitude: Annotated[list[Annotated[float, Field(ge=0)]], PAIR] = Field(default=[0.5, 1.0])
+    amplitude: Annotated[list[Annotated[float, Field(ge=0)]], *PAIR] = Field(default=[0.5, 1.0])
     """Bounds of the amplitudes; `gain` is the signal per unit."""
-    lag: Annotated[list[Angle], PAIR] = Field(default=[-math.pi, math.pi])
+    lag: Annotated[list[Angle], *PAIR] = Field(default=[-math.pi, math.pi])
     """Bounds of the phase by which an oscillator is behind the one before it."""
-    coupling: Annotated[list[Annotated[Rate, Field(ge=0)]], PAIR] = Field(default=[8.0, 8.0])
+    coupling: Annotated[list[Annotated[InverseTime, Field(ge=0)]], *PAIR] = Field(
+        default=[8.0, 8.0]
+    )
     """Bounds of the coupling w of neighbours. A phase that is displaced by a little comes back at a
     rate of about w."""
     common: list[Literal["amplitude", "lag"]] = Field(default=[])
     """Parameters that random and evolved gaits have in common for all oscillators."""
-    settling: Rate = Field(default=20.0, gt=0)
+    settling: InverseTime = Field(default=20.0, gt=0)
     """Rate at which amplitudes settle."""
-
-    @model_validator(mode="after")
-    def _check_bounds(self) -> Phase:
-        for name in ("frequency", "amplitude", "lag", "coupling"):
-            low, high = getattr(self, name)
-            if low > high:
-                refuse(name, f"found {low:g} to {high:g}, expected the least value first")
-        return self
 
     @property
     def usual_amplitude(self) -> float:
@@ -127,33 +116,32 @@ class Phase(CpgKind):
         """Frequency, amplitudes, lags, coupling, and gains of the feedback."""
         numbers = range(1, wiring.signals + 1)
         given = {
-            "frequency": ([""], self.frequency, "Hz"),
-            "amplitude": ([f" {k}" for k in numbers], self.amplitude, ""),
-            "lag": ([f" {k}->{k + 1}" for k in numbers[:-1]], self.lag, "rad"),
-            "coupling": ([""], self.coupling, "1/s"),
+            "frequency": (["frequency"], "Hz"),
+            "amplitude": ([f"amplitude {k}" for k in numbers], ""),
+            "lag": ([f"lag {k}->{k + 1}" for k in numbers[:-1]], "rad"),
+            "coupling": (["coupling"], "1/s"),
         }
         found: dict[str, GaitParameter] = {}
-        for name, (endings, (low, high), unit) in given.items():
-            limit = -math.inf if name == "lag" else 0.0
-            first = GaitParameter(low, high, floor=limit, least=limit, unit=unit)
-            other = (
-                first._replace(copies=name + "".join(endings[:1])) if name in self.common else first
-            )
-            found |= {f"{name}{end}": other if k else first for k, end in enumerate(endings)}
+        for key, (names, unit) in given.items():
+            (low, high), limit = getattr(self, key), -math.inf if key == "lag" else 0.0
+            for name in names:
+                copies = names[0] if key in self.common and name != names[0] else ""
+                found[name] = GaitParameter(low, high, limit, limit, unit=unit, copies=copies)
         return found | self.gain_parameters()
 
-    def constants(self, wiring: Wiring, gait: Mapping[str, float]) -> PhaseConstants:
-        count = wiring.signals
-        lags = [gait[f"lag {k}->{k + 1}"] for k in range(1, count)]
-        return PhaseConstants(
-            frequency=np.full(count, math.tau * gait["frequency"]),
-            amplitude=np.array([gait[f"amplitude {k + 1}"] for k in range(count)]),
-            lag=np.array([0.0, *lags][:count]),
-            coupling=np.array([0.0, *[gait["coupling"]] * len(lags)][:count]),
+    def network(
+        self, wiring: Wiring, gait: Mapping[str, float]
+    ) -> tuple[PhaseConstants, np.ndarray]:
+        count, frequency = wiring.signals, gait["frequency"]
+        numbers = range(1, count + 1)
+        coupling = np.full(count, gait["coupling"])
+        coupling[:1] = 0.0
+        constants = PhaseConstants(
+            frequency=np.full(count, math.tau * frequency),
+            amplitude=np.array([gait[f"amplitude {k}"] for k in numbers]),
+            lag=np.array([gait.get(f"lag {k - 1}->{k}", 0.0) for k in numbers]),
+            coupling=coupling,
             settling=np.full(count, self.settling),
         )
-
-    def starting_state(self, wiring: Wiring, gait: Mapping[str, float]) -> np.ndarray:
-        before = 0.25 + gait["frequency"] * self.start_up
-        phases = -math.tau * before - np.cumsum(self.constants(wiring, gait).lag)
-        return np.concatenate([phases, np.zeros(2 * wiring.signals)])
+        phases = -math.tau * (0.25 + frequency * self.start_up) - np.cumsum(constants.lag)
+        return constants, np.append(phases, np.zeros(2 * count))

@@ -223,10 +223,10 @@ class TalliedMetrics:
 
     rolled: float = metric("rad", "forward positive", total("rolled"))
     """Angle by which the robot has rolled forward, about the world's y axis, at the end; whole
-    turns count. It is the integral of the angular velocity of the rigid motion that fits the nodes'
-    velocities best, so a change of shape does not count."""
+    turns count: the integral of the angular velocity of the rigid motion that fits the nodes'
+    velocities best."""
     actuator_work: float = metric("J", "of all actuators", total("effort.work"), is_cost=True)
-    """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
+    """Work of the actuators in the steady stretch, if they recover no energy: the integral of
     max(0, -S dl/dt) for driven cables with signal S and length l."""
     signal_rate: float = metric(
         "N/s",
@@ -247,7 +247,7 @@ class TalliedMetrics:
     over the bodies. In MuJoCo it says little."""
     clearance: float = metric("m", "smallest gap of struts' axes", total("clearance"), least=True)
     """Least distance, at any time, between the axes of struts of two bodies. Struts overlap if it
-    is less than their diameter: the model does not prevent this."""
+    is less than their diameter."""
     tension: float = metric("N", "smallest of any cable", total("least_tension"), least=True)
     """Least tension of any cable at any time. Below 0 the cable would have to push."""
     peak_actuator_force: float = greatest(

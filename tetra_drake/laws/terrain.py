@@ -401,7 +401,7 @@ class Relief(Section):
 
 
 class Flat(Relief):
-    """Level ground at height 0: the thesis's floor, and the default."""
+    """Level ground at height 0, the default."""
 
     is_flat = True
     place = ""

@@ -321,11 +321,7 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
         gaits=gaits,
         map=_notable(shown),
         parameters=_parameters_text(gait, scenario),
-        weights={
-            name.removeprefix(_WEIGHT): weight
-            for name, weight in gait.parameters.items()
-            if name.startswith(_WEIGHT)
-        },
+        weights={name: x for name, x in gait.parameters.items() if name.startswith(_WEIGHT)},
         differences=differences,
         files={
             "scenario": SCENARIO,

@@ -5,21 +5,22 @@ from __future__ import annotations
 import dataclasses
 import math
 import numbers
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from tetra_drake.errors import InputError, check_type
+from tetra_drake.errors import InputError, check_type, checked_numbers
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.gait import Gait, check_parameters
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import DrivenRobot, Pilot
+from tetra_drake.robot.signals import DrivenRobot, LoopLaw, Pilot
 from tetra_drake.robot.steering import SteeringSignal
-from tetra_drake.scenario.policies import DrivenRobots, PolicyKind
+from tetra_drake.scenario.policies import DrivenRobots
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -50,19 +51,12 @@ class Command:
         if not 0.0 < self.period < math.inf:
             raise InputError(source, "period", f"found {self.period}, expected a number above 0")
         check_type(source, "samples", self.samples, np.ndarray)
-        shape, kind = self.samples.shape, self.samples.dtype
-        if len(shape) != 2 or shape[1] != driven.size:
-            problem = f"is of shape {shape}, expected {driven.size} driven cables"
-        elif not len(self.samples):
-            problem = "has none, expected one at least"
-        elif kind.kind not in "iuf":
-            problem = f"found {kind}, expected numbers"
-        elif not np.isfinite(self.samples).all():
-            problem = "found nan or inf, expected finite numbers"
-        else:
-            return
-        raise InputError(source, "samples", problem)
+        shape = max(1, len(self.samples)), driven.size
+        checked_numbers(self.samples, shape, source=source, key="samples", finite=True)
 
+
+Controller = Callable[[float, Readings], npt.ArrayLike]
+"""Function from the time (s) and the readings of one robot to its actions (actions,)."""
 
 Driver = Gait | Command
 """A gait or a command: what drives the actuators without a controller."""
@@ -95,7 +89,11 @@ def driven_robot(
             return DrivenRobot.of(robot, driver, steering=steering)
         if steering is not None:
             raise InputError("steering", "", f"found a function, and {driver.name} is for a policy")
-        return _piloted_robot(robot, driver, scenario.policy)
+        own = scenario.policy.gait_parameters(robot.structure)
+        given = check_parameters(driver.parameters, own, f"gait {driver.name}", "parameters")
+        values, step = np.array([*given.values()], dtype=float), scenario.cpg.listing_step
+        period = step * round(scenario.simulation.control_period / step)
+        return _looped(robot, scenario.policy.signals, values, period, gait=driver)
     robot = robot.without_network()
     driver.check(robot)
     step = scenario.cpg.listing_step
@@ -115,14 +113,55 @@ def controlled_robot(scenario: Scenario) -> Robot:
     return Robot.of(scenario).controlled
 
 
-def _piloted_robot(robot: Robot, gait: Gait, policy: PolicyKind) -> DrivenRobot:
-    """A robot driven by its scenario's policy with the parameters of a gait, whose first signals
-    act from the start on. Raises InputError if the gait has other parameters."""
-    scenario, step = robot.scenario, robot.scenario.cpg.listing_step
-    source, own = f"gait {gait.name}", scenario.parameters
-    given = check_parameters(gait.parameters, own, source=source, key="parameters")
-    values = np.array([*given.values()], dtype=float)
-    controlled, structure = robot.controlled, robot.structure
+def robot_of_controller(
+    scenario: Scenario, controller: Controller, *, period: float | None = None
+) -> DrivenRobot:
+    """The robot of a scenario, driven by a controller, which acts once in each `period` (s); see
+    checked_period(). Raises InputError if the period is wrong, or the actions at the start; later,
+    while the robot moves, if other actions are wrong."""
+
+    def law(robots: DrivenRobots, readings: Readings, _: np.ndarray) -> np.ndarray:
+        one = readings.rows(0)
+        given, shape = controller(float(one.time), one), robots.rest.shape
+        return robots.signals_of(checked_actions(given, shape, source="controller", finite=True))
+
+    driven = _looped(Robot.of(scenario), law, np.zeros(0), checked_period(period, scenario))
+    return dataclasses.replace(driven, name=getattr(controller, "__name__", "controller"))
+
+
+def checked_period(period: float | None, scenario: Scenario) -> float:
+    """A control period (s), by default the scenario's, as a multiple of `cpg.listing_step`. Raises
+    InputError unless it is one, or if it is longer than the simulation."""
+    source, key, step = "Simulation", "control_period", scenario.cpg.listing_step
+    if period is None:
+        period = scenario.simulation.control_period
+        source, key = f"scenario {scenario.name}", "simulation.control_period"
+    is_number = isinstance(period, numbers.Real) and not isinstance(period, bool)
+    within = is_number and 0.0 < period <= max(scenario.simulation.duration, step)
+    steps = round(period / step) if within else 0
+    if steps < 1 or abs(period - steps * step) > 1e-6 * step:
+        expected = f"a multiple of cpg.listing_step, {step:g} s, up to simulation.duration"
+        raise InputError(source, key, f"found {period!r:.60}, expected {expected}")
+    return steps * step
+
+
+def checked_actions(
+    actions: npt.ArrayLike, shape: tuple[int, ...], *, source: str, finite: bool = False
+) -> np.ndarray:
+    """Converts actions to an array of `shape` (N, actions); for a single robot they may be
+    (actions,). Raises InputError, which names `source`, if they have another shape, or are not real
+    numbers; with `finite` also for nan and inf."""
+    shapes = (shape[1:], shape) if shape[0] == 1 else (shape,)
+    numbers = checked_numbers(actions, *shapes, source=source, key="actions", finite=finite)
+    return numbers.reshape(shape)
+
+
+def _looped(
+    robot: Robot, law: LoopLaw, values: np.ndarray, period: float, *, gait: Gait | None = None
+) -> DrivenRobot:
+    """A robot that a policy or a controller drives, whose first signals act from the start on. For
+    the arguments see Pilot; `gait` is None for a controller."""
+    scenario, controlled, structure = robot.scenario, robot.controlled, robot.structure
     cables, struts = robot.starting_cables(), structure.p_WN[structure.struts]
     size = np.linalg.norm(np.diff(struts[0], axis=0)) if len(struts) else scenario.robot.size
     robots = DrivenRobots(
@@ -135,19 +174,25 @@ def _piloted_robot(robot: Robot, gait: Gait, policy: PolicyKind) -> DrivenRobot:
         weight=np.array(robot.weight),
         size=np.array(size),
     )
-    period = step * round(scenario.simulation.control_period / step)
-    pilot = Pilot(policy=policy, values=values, robots=robots, period=period)
-    readings = Readings(*(np.array(values)[np.newaxis] for values in first_readings(controlled)))
-    samples = policy_signals([pilot], readings)
+    end = scenario.simulation.duration
+    pilot = Pilot(law=law, values=values, robots=robots, period=period, end=end)
+    samples = signals_of_one(pilot, first_readings(controlled))[np.newaxis]
     controlled = dataclasses.replace(controlled, first_signals=samples[0])
-    return DrivenRobot(robot=controlled, name=gait.name, samples=samples, gait=gait, pilot=pilot)
+    name = gait.name if gait else ""
+    return DrivenRobot(robot=controlled, name=name, samples=samples, gait=gait, pilot=pilot)
+
+
+def signals_of_one(pilot: Pilot, readings: Readings) -> np.ndarray:
+    """Signals (m,) in N that a policy or a controller gives for the readings of its robot, which
+    have no axis of robots. Raises the errors of policy_signals()."""
+    return policy_signals([pilot], Readings(*(np.array(each)[np.newaxis] for each in readings)))[0]
 
 
 def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
-    """Signals (N, m) in N that the policies of N robots give for their readings. Raises InputError
-    if a user's policy returns anything but finite numbers of this shape."""
+    """Signals (N, m) in N that the policies or controllers of N robots give for their readings.
+    Raises InputError if a user's function returns anything but finite numbers of this shape."""
     signals = np.empty((len(pilots), len(pilots[0].robots.ends)))
-    groups: dict[tuple[str, str], list[int]] = {}
+    groups: dict[str, list[int]] = {}
     for row, pilot in enumerate(pilots):
         groups.setdefault(pilot.kind, []).append(row)
     for rows in groups.values():
@@ -155,7 +200,7 @@ def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
         arrays = [pilot.robots[2:] for pilot in some]
         together = DrivenRobots(*some[0].robots[:2], *_stacked(arrays))
         values = np.array([pilot.values for pilot in some])
-        signals[rows] = some[0].policy.signals(together, readings.rows(rows), values)
+        signals[rows] = some[0].law(together, readings.rows(rows), values)
     return signals
 
 

@@ -13,8 +13,8 @@ from tetra_drake.scenario.world import World
 Body = tuple[tuple[str, float | str], ...]
 """Numbers of a robot: scenario keys, and values as texts with units, or as numbers without one."""
 
-_FEW = 8
-"""Largest number of parameters whose names begin with the same word and are all printed."""
+_MOST = 40
+"""Largest number of parameters that are printed."""
 
 
 @dataclass(frozen=True)
@@ -43,21 +43,13 @@ class Gait:
 
     @property
     def _table(self) -> TextTable:
-        """Table of the parameters, the turn unless it is 0, and the numbers of the body. Of many
-        parameters whose names begin with the same word, it has number and range."""
-        alike: dict[str, list[tuple[str, float | str]]] = {}
+        """Table of the parameters, the turn unless it is 0, and the numbers of the body; of a long
+        one the beginning."""
         turn = {"turn": self.turn} if self.turn else {}
-        for name, value in {**self.parameters, **turn, **dict(self.body)}.items():
-            alike.setdefault(name.partition(" ")[0], []).append((name, value))
-        rows = []
-        for word, group in alike.items():
-            values = sorted(float(value) for _, value in group if not isinstance(value, str))
-            if len(values) > _FEW:
-                ends = f"{_four_digits(values[0])} to {_four_digits(values[-1])}"
-                rows.append([f"{word} ({len(values)})", ends])
-            else:
-                rows += [[name, _four_digits(value)] for name, value in group]
-        return TextTable(["parameter", "value"], rows, (0, 1))
+        numbers = {**self.parameters, **turn, **dict(self.body)}
+        rows = [[name, _four_digits(value)] for name, value in numbers.items()][:_MOST]
+        more = [["...", f"{len(numbers) - _MOST} more"]] if len(numbers) > _MOST else []
+        return TextTable(["parameter", "value"], rows + more, (0, 1))
 
     def to_json(self, scenario: World) -> dict[str, Any]:
         """Content of a gait file, for json.dumps(). It has the name of the scenario that the gait
@@ -76,28 +68,27 @@ def _four_digits(value: float | str) -> str:
 
 
 def check_parameters(
-    given: Mapping[str, float],
-    expected: Mapping[str, GaitParameter],
-    *,
-    source: object,
-    key: str = "",
+    given: Mapping[str, float], expected: Mapping[str, GaitParameter], source: object, key: str = ""
 ) -> dict[str, float]:
     """The values of `given` in the order of the parameters `expected`. One that may be missing gets
     its default. Raises InputError, naming source and key, for other names, or for a value that is
     too small or not finite."""
-    missing = [name for name, one in expected.items() if name not in given and not one.has_default]
-    unknown = [name for name in given if name not in expected]
-    problems = [f"lacks {len(missing)} names, such as '{missing[0]}'"] if missing else []
-    if unknown:
-        problems.append(f"has {len(unknown)} unknown names, such as '{unknown[0]}'")
-    if problems:
-        found = f"found {len(given)}, expected the {len(expected)} of the scenario"
-        raise InputError(source, key, f"{found}; {' and '.join(problems)}")
-    values: dict[str, float] = {}
+    values, missing = dict[str, float](), list[str]()
     for name, one in expected.items():
-        value = values[name] = given[name] if name in given else one.default_among(values)
-        if not (one.least <= value and math.isfinite(value)):
+        default = one.ratio * values[one.leader] if one.leader in values else one.default
+        value = given.get(name, default)
+        if value is None:
+            missing.append(name)
+        elif not (one.least <= value and math.isfinite(value)):
             limit = "a finite number" if one.least == -math.inf else f"{one.least:g} or more"
-            problem = f"found {value}, expected {limit}"
-            raise InputError(source, f"{key}.{name}".strip("."), problem)
+            place = f"{key}.{name}".strip(".")
+            raise InputError(source, place, f"found {value}, expected {limit}")
+        else:
+            values[name] = value
+    unknown = [name for name in given if name not in expected]
+    problems = {"lacks {} names": missing, "has {} unknown names": unknown}.items()
+    texts = [f"{text.format(len(some))}, such as '{some[0]}'" for text, some in problems if some]
+    if texts:
+        found = f"found {len(given)}, expected the {len(expected)} of the scenario"
+        raise InputError(source, key, f"{found}; {' and '.join(texts)}")
     return values

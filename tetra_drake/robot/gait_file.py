@@ -71,7 +71,7 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
     place = f"{key}.parameters".strip(".")
     gait = Gait(
         name=file.name or Path(path).stem,
-        parameters=check_parameters(file.parameters, scenario.parameters, source=path, key=place),
+        parameters=check_parameters(file.parameters, scenario.parameters, path, place),
         turn=file.turn,
         body=tuple(file.body.items()),
         scenario=file.scenario,

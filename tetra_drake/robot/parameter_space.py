@@ -1,9 +1,8 @@
 """Parameter space that evolution searches: vectors of gaits and of the bodies beside them."""
 
 import dataclasses
-import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -52,63 +51,52 @@ class ParameterSpace:
 
     parameters: Mapping[str, GaitParameter]
     """All parameters of a gait by name; see Scenario.parameters."""
-    evolve: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    evolve: Mapping[str, Sequence[float]]
     """Bounds of the numbers of the body, also of fixed ones; see Scenario.evolve."""
-    turn: float = 0.0
+    turn: float
     """Steering of all gaits; see Gait.turn."""
+    free_body: tuple[str, ...]
+    """Keys of the numbers of the body that are parameters: their bounds differ."""
+    body: slice
+    """Places of the body's numbers in a vector."""
+    names: tuple[str, ...]
+    """Names such as "weight 3->1 extensor", "gain length", "robot.density", "tau_A"."""
+    low: Vector
+    high: Vector
+    """Upper bounds of the parameters of random gaits; `low` are the lower bounds (Table 5)."""
+    floors: Vector
+    """Lower limits of the search. Mutation keeps parameters above (listing A.3.3, A.3.4)."""
+    leaders: npt.NDArray[np.int64]
+    """Index of the parameter that each one follows, as tau_B follows tau_A; -1 if it follows
+    none."""
+    is_coupled: npt.NDArray[np.bool_]
+    """True for parameters that always have the `ratio` to their leaders."""
 
     @classmethod
     def of(cls, scenario: GivenScenario) -> Self:
         """The parameter space of a scenario, given by its name or file, or by a run. A parameter
         with equal bounds is fixed."""
         scenario = given_scenario(scenario)
-        return cls(scenario.parameters, scenario.evolve, scenario.gait_bounds.turn)
-
-    @functools.cached_property
-    def free_body(self) -> tuple[str, ...]:
-        """Keys of the numbers of the body that are parameters: their bounds differ."""
-        return tuple(key for key, (low, high) in self.evolve.items() if low < high)
-
-    @functools.cached_property
-    def names(self) -> tuple[str, ...]:
-        """Names such as "weight 3->1 extensor", "gain length", "robot.density", "tau_A"."""
-        searched = {name: one for name, one in self.parameters.items() if not one.copies}
-        pairs = {(name, one.leader) for name, one in searched.items() if one.leader}
-        in_pairs = {name for pair in pairs for name in pair}
-        alone = [name for name in searched if name not in in_pairs]
-        return (*alone, *self.free_body, *(name for name in searched if name in in_pairs))
-
-    @property
-    def body(self) -> slice:
-        """Places of the body's numbers in a vector."""
-        first = self.names.index(self.free_body[0]) if self.free_body else 0
-        return slice(first, first + len(self.free_body))
-
-    @functools.cached_property
-    def _rows(self) -> list[GaitParameter]:
-        """Parameters in the order of a vector."""
-        body = {key: GaitParameter(low, high) for key, (low, high) in self.evolve.items()}
-        return [body[name] if name in body else self.parameters[name] for name in self.names]
-
-    @functools.cached_property
-    def low(self) -> Vector:
-        """Lower bounds of the parameters of random gaits (Table 5)."""
-        return np.array([row.low for row in self._rows], dtype=float)
-
-    @functools.cached_property
-    def high(self) -> Vector:
-        """Upper bounds of the parameters of random gaits."""
-        return np.array([row.high for row in self._rows], dtype=float)
-
-    @functools.cached_property
-    def floors(self) -> Vector:
-        """Lower limits of the search. Mutation keeps parameters above (listing A.3.3, A.3.4)."""
-        return np.array([row.floor for row in self._rows], dtype=float)
-
-    @functools.cached_property
-    def is_coupled(self) -> npt.NDArray[np.bool_]:
-        """True for parameters that are always a multiple of another one, as tau_B is of tau_A."""
-        return np.array([bool(row.leader and row.coupled) for row in self._rows], dtype=bool)
+        free = {key: GaitParameter(a, b) for key, (a, b) in scenario.evolve.items() if a < b}
+        searched = {name: one for name, one in scenario.parameters.items() if not one.copies}
+        leaders = {one.leader for one in searched.values()}
+        alone = [name for name, one in searched.items() if not one.leader and name not in leaders]
+        names = (*alone, *free, *(name for name in searched if name not in alone))
+        rows = [(searched | free)[name] for name in names]
+        low, high, floors = np.array([row[:3] for row in rows], dtype=float).reshape(-1, 3).T.copy()
+        return cls(
+            parameters=scenario.parameters,
+            evolve=scenario.evolve,
+            turn=scenario.gait_bounds.turn,
+            free_body=tuple(free),
+            body=slice(len(alone), len(alone) + len(free)),
+            names=names,
+            low=low,
+            high=high,
+            floors=floors,
+            leaders=np.array([names.index(x.leader) if x.leader else -1 for x in rows], dtype=int),
+            is_coupled=np.array([bool(x.leader) and x.coupled for x in rows], dtype=bool),
+        )
 
     def gait(self, vector: npt.ArrayLike, *, name: str) -> Gait:
         """Gait called `name` with the parameters of a vector (parameters,), in the order of
@@ -116,25 +104,24 @@ class ParameterSpace:
         a number that no gait may have, such as a weight below 0."""
         values = dict(zip(self.names, self._numbers(vector).tolist(), strict=True))
         own = {key: values[one.copies or key] for key, one in self.parameters.items()}
-        check_parameters(own, self.parameters, source=f"gait {name}")
+        check_parameters(own, self.parameters, f"gait {name}")
         return Gait(name, own, turn=self.turn, body=self._body_of(values))
 
     def _body_of(self, values: Mapping[str, float]) -> Body:
         """Keys of all numbers of the body, and their values. `values` has the free ones in SI."""
-        numbers = {
-            key: Quantity(values.get(key, low), low.unit)
-            if isinstance(low, Quantity)
-            else values.get(key, low)
-            for key, (low, _) in self.evolve.items()
-        }
+
+        def like(low: float, value: float) -> float:
+            return Quantity(value, low.unit) if isinstance(low, Quantity) else value
+
+        numbers = {key: like(low, values.get(key, low)) for key, (low, _) in self.evolve.items()}
         return tuple(written(numbers).items())
 
     def vector(self, gait: Gait) -> Vector:
         """Parameter vector of a gait, without its name, its turn and fixed numbers of its body. Of
         parameters that copy each other, the first one counts. Raises InputError if the gait has
         other parameters, or lacks a number of the body."""
-        source, key = "ParameterSpace", f"gait {gait.name}"
-        values = check_parameters(gait.parameters, self.parameters, source=source, key=key)
+        key = f"gait {gait.name}"
+        values = check_parameters(gait.parameters, self.parameters, "ParameterSpace", key)
         values |= self._body_numbers(gait)
         return np.array([values[name] for name in self.names], dtype=float)
 
@@ -154,7 +141,7 @@ class ParameterSpace:
         """Random parameter vector, uniform between `low` and `high`. A parameter that follows
         another one is not drawn, even if a search may change it independently later: tau_B is
         2 tau_A."""
-        vector, drawn = self.low.copy(), np.array([row.leader == "" for row in self._rows])
+        vector, drawn = self.low.copy(), self.leaders < 0
         vector[drawn] = generator.uniform(self.low[drawn], self.high[drawn])
         return self._with_followers(vector, ~drawn)
 
@@ -169,8 +156,8 @@ class ParameterSpace:
     def _with_followers(self, vector: Vector, which: npt.NDArray[np.bool_]) -> Vector:
         """Sets some parameters of a vector, in place, by the ones that they follow."""
         for place in np.flatnonzero(which).tolist():
-            row = self._rows[place]
-            vector[place] = row.ratio * vector[self.names.index(row.leader)]
+            ratio = self.parameters[self.names[place]].ratio
+            vector[place] = ratio * vector[self.leaders[place]]
         return vector
 
     def _numbers(self, vector: npt.ArrayLike) -> Vector:

@@ -12,6 +12,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import rounded
 from tetra_drake.laws import cable
+from tetra_drake.robot.equilibrium import Equilibrium
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.blueprint import SAGS
@@ -85,12 +86,10 @@ def sinking_remark(robot: Robot) -> str:
     It names a ground stiffness that would bear the robot. It is "" otherwise, and without an
     equilibrium."""
     structure, units, ground = robot.structure, robot.scenario.units, robot.scenario.ground
-    if not structure.contacts.size:
+    equilibrium = _equilibrium(robot) if structure.contacts.size else None
+    if equilibrium is None:
         return ""
-    try:
-        z = node_positions(structure, robot.equilibrium.state)[:, 2]
-    except InputError:
-        return ""
+    z = node_positions(structure, equilibrium.state)[:, 2]
     radius, contacts = structure.contact_radius, structure.contacts
     depth = (radius - z)[contacts].max()
     height = (z + radius).max() - (z - radius).min() or 2.0 * structure.least_radius
@@ -109,10 +108,7 @@ def yielding_remark(robot: Robot) -> str:
     anchors, joints = structure.anchors, structure.joint_springs
     names = [f"anchors.{structure.node_names[node]}" for node in anchors.nodes]
     names += structure.joint_keys
-    try:
-        equilibrium = robot.equilibrium if names and cables.size else None
-    except InputError:
-        return ""
+    equilibrium = _equilibrium(robot) if names and cables.size else None
     if equilibrium is None:
         return ""
     p_WN = node_positions(structure, equilibrium.state)
@@ -131,6 +127,14 @@ def yielding_remark(robot: Robot) -> str:
     gives = f"at rest {names[most]} gives way by {units.shown(way, 'm')}, {share} stretch of cables"
     light = ", but with shorter steps" if is_bound else ""
     return f"{gives}; {needed} would hold it{light}"
+
+
+def _equilibrium(robot: Robot) -> Equilibrium | None:
+    """The equilibrium of a robot; None if it has none."""
+    try:
+        return robot.equilibrium
+    except InputError:
+        return None
 
 
 def _usual_signal(robot: Robot) -> tuple[float, np.ndarray]:

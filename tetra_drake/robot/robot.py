@@ -16,7 +16,7 @@ from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import cable
 from tetra_drake.laws.actuator import DrivenCables
 from tetra_drake.laws.contact import MODE_COLUMNS, Ground, NormalForce
-from tetra_drake.laws.feedback import Senses
+from tetra_drake.laws.feedback import PATHWAYS, Senses
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Bodies, Model
@@ -249,22 +249,15 @@ class Robot:
 
     def oscillators(self, gait: Gait) -> Oscillators:
         """Oscillators with the numbers of a gait, for kernels. Raises InputError if the gait does
-        not fit the scenario."""
-        cpg = self.scenario.cpg
-        return Oscillators(cpg.own, cpg.constants(self.structure, self._checked(gait)))
-
-    def starting_oscillators(self, gait: Gait) -> np.ndarray:
-        """States (s,) of the oscillators at t = 0. Raises InputError as oscillators()."""
-        return self.scenario.cpg.starting_state(self.structure, self._checked(gait))
+        not fit them."""
+        cpg, source = self.scenario.cpg, f"gait {gait.name}"
+        values = check_parameters(gait.parameters, self._parameters, source, "parameters")
+        gains = np.array([values.get(f"gain {name}", 0.0) for name in PATHWAYS])
+        return Oscillators(cpg.own, *cpg.network(self.structure, values), gains)
 
     @functools.cached_property
     def _parameters(self) -> Mapping[str, GaitParameter]:
         return self.scenario.cpg.parameters(self.structure)
-
-    def _checked(self, gait: Gait) -> dict[str, float]:
-        """Parameters of a gait, by name. Raises InputError if they do not fit the oscillators."""
-        source = f"gait {gait.name}"
-        return check_parameters(gait.parameters, self._parameters, source=source, key="parameters")
 
     def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
         """Turns, -1 to 1: how much more input left oscillators have than right ones.

@@ -8,49 +8,57 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
 from tetra_drake.kernels.packed import Packed
-from tetra_drake.laws.feedback import PATHWAYS
-from tetra_drake.laws.matsuoka import NO_NETWORK, Matsuoka
+from tetra_drake.laws.matsuoka import NO_OSCILLATORS
 from tetra_drake.laws.oscillator import Oscillators, make_states, write_outputs
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.steering import SteeringSignal
-from tetra_drake.scenario.policies import DrivenRobots, PolicyKind
+from tetra_drake.scenario.policies import DrivenRobots
 
 MARK_DECIMALS = 9
 """Decimals of the times (s) at which a step must end. A step between two times that differ in
 rounding would be too short."""
 
 
+LoopLaw = Callable[[DrivenRobots, Any, np.ndarray], np.ndarray]
+"""Function from the constants of N robots, their Readings and the parameters (N, parameters) of a
+policy to their signals (N, m) in N; see PolicyKind.signals()."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Pilot:
-    """Policy that drives a robot: its parameters, and what it knows of the robot."""
+    """Closed loop that drives a robot: a policy with its parameters, or a controller."""
 
-    policy: PolicyKind
+    law: LoopLaw
     values: np.ndarray
-    """Parameters (parameters,), in the order of Scenario.parameters."""
+    """Parameters (parameters,), in the order of Scenario.parameters; none of a controller."""
     robots: DrivenRobots
     """Constants of the one robot, without the axis of robots."""
     period: float
     """Time (s) between actions, a multiple of `cpg.listing_step`."""
-
-    def acts_after(self, time: float) -> float:
-        """Time (s) of the next action after an action at `time` (s)."""
-        return round(self.period * (round(time / self.period) + 1), MARK_DECIMALS)
+    end: float
+    """Time (s) of the end of the simulation, before which the last action is."""
 
     @functools.cached_property
-    def kind(self) -> tuple[str, str]:
-        """Settings, as JSON, of the policy and the actuators. Robots with equal ones can be steered
-        together."""
-        return self.policy.model_dump_json(), self.robots.actuation.model_dump_json()
+    def kind(self) -> str:
+        """The policy's settings, or the controller, and the kind of actuators, as a text. Robots
+        with equal ones can be steered together."""
+        return repr((getattr(self.law, "__self__", self.law), self.robots.actuation))
+
+    def acts_after(self, time: float) -> float:
+        """Time (s) of the next action after an action at `time` (s); infinite for the last one."""
+        after = round(self.period * (round(time / self.period) + 1), MARK_DECIMALS)
+        return after if after < self.end - 0.5 * 10.0**-MARK_DECIMALS else math.inf
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,7 +77,7 @@ class DrivenRobot:
     steering: SteeringSignal | None = None
     """Function from time to the turn, -1 to 1, in place of the gait's turn; None for the gait's."""
     pilot: Pilot | None = None
-    """The policy that sets the signals while the robot moves; None without one."""
+    """The policy or controller that sets the signals while the robot moves; None without one."""
 
     @classmethod
     def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
@@ -95,12 +103,6 @@ class DrivenRobot:
         """Time (s) from which mean values are taken: `simulation.steady_from`, or the start-up time
         if this is later."""
         return max(self.robot.scenario.simulation.settling_time, self.start_up)
-
-    @property
-    def is_controlled(self) -> bool:
-        """True if a controller sets the signals while the robot moves. False for a gait or a
-        command."""
-        return len(self.samples) == 1
 
     @property
     def is_live(self) -> bool:
@@ -165,21 +167,7 @@ class DrivenRobot:
     @property
     def oscillators(self) -> Oscillators:
         """Oscillators that make the signals; none if they are given."""
-        if self.oscillating is not None:
-            return self.robot.oscillators(self.oscillating)
-        return Oscillators(Matsuoka.own, NO_NETWORK)
-
-    @property
-    def starting_state(self) -> np.ndarray:
-        """States (s,) of the oscillators at t = 0; none if the signals are given."""
-        gait = self.oscillating
-        return self.robot.starting_oscillators(gait) if gait else np.zeros(0)
-
-    @property
-    def gains(self) -> np.ndarray:
-        """Gains of the network's feedback, one for each pathway in the order of
-        laws.feedback.PATHWAYS; zeros without feedback or network."""
-        return gains_of(self.oscillating)
+        return self.robot.oscillators(self.oscillating) if self.oscillating else NO_OSCILLATORS
 
     @property
     def turns(self) -> np.ndarray:
@@ -188,12 +176,6 @@ class DrivenRobot:
         without a gait."""
         gait = self.oscillating
         return self.robot.turns(gait, self.steering) if gait else np.zeros(1)
-
-
-def gains_of(gait: Gait | None) -> np.ndarray:
-    """Gains of a gait's feedback, one for each pathway in the order of laws.feedback.PATHWAYS."""
-    parameters = gait.parameters if gait else {}
-    return np.array([parameters.get(f"gain {name}", 0.0) for name in PATHWAYS])
 
 
 def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
@@ -212,15 +194,15 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
     Raises InputError if the gait does not fit. Raises InputError for a gait with feedback, because
     its signals depend on the robot's motion.
     """
-    cpg, oscillators = robot.scenario.cpg, robot.structure.signals
-    if gains_of(gait).any():
+    cpg, oscillators = robot.scenario.cpg, robot.oscillators(gait)
+    if oscillators.gains.any():
         problem = "has feedback; its signals exist only while the robot is simulated"
         raise InputError(f"gait {gait.name}", "gains", problem)
     turns = robot.turns(gait, steering)
     midway = 0.5 * (turns[:-1] + turns[1:]) if turns.size > 1 else turns
     inputs = robot.tonic_input(midway)
-    parts = Packed((robot.oscillators(gait), make_states(robot.starting_oscillators(gait))))
-    output = np.empty((DrivenRobot.of(robot, gait).sample_count, oscillators))
+    parts = Packed((oscillators, make_states(oscillators)))
+    output = np.empty((DrivenRobot.of(robot, gait).sample_count, robot.structure.signals))
     write_outputs(parts, inputs, cpg.listing_step, cpg.signals == "listing", output)
     return cpg.gain * np.vstack([output, output[-1:], output[-1:]])
 

@@ -37,14 +37,14 @@ class Drake(EngineSettings):
     scheme: Literal["radau3", "runge_kutta3"] | None = None
     """Integrator: implicit (radau3) or explicit (runge_kutta3). By default radau3 for up to 12
     bodies; for n more it is runge_kutta3, unless dampers stop the fastest motion at a rate above 14
-    n² per second: the work of radau3 grows with n², the work of runge_kutta3 with the rate."""
+    n² per second."""
     accuracy: float | None = Field(default=None, gt=0)
-    """Target accuracy per step. If not given, half the least damping ratio of a cable, anchor or
-    joint with the robot's mass, from 2e-5 to 0.005: longer steps of radau3 would damp vibrations
-    more. Where friction is nearly viscous, as in the scenario thesis, it is up to 0.01."""
+    """Target accuracy per step. By default half the least damping ratio of a cable, anchor or joint
+    with the robot's mass, from 2e-5 to 0.005, or to 0.01 where friction is nearly viscous, as in
+    the scenario thesis: longer steps of radau3 would damp vibrations."""
     max_step: Time | None = Field(default=None, gt=0)
-    """Longest step. If not given, 8 ms, or 12 ms where friction is nearly viscous; less if that
-    damping ratio is below 0.05, so that vibrations of any size keep theirs."""
+    """Longest step. By default 8 ms, or 12 ms where friction is nearly viscous; less if that
+    damping ratio is below 0.05."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
     """When a node may change its mode: at the end of steps, or where a witness function is zero.
     `witness` needs short steps, such as the steps of runge_kutta3."""

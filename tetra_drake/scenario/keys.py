@@ -7,6 +7,7 @@ among the others.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable
 
 from tetra_drake.formatting import listed
@@ -70,7 +71,7 @@ def keys_page() -> str:
     parts, others = [_INTRODUCTION], []
     schema = Scenario.model_json_schema()
     for key, node in schema["properties"].items():
-        items, told = node.get("items"), dict[str, str]()
+        items, told = node.get("items"), dict[str, tuple[str, str]]()
         sections = [one for one in members_of(items or node, schema) if "$ref" in one]
         inner = f"{key}[0]" if items else key
         for section in sections:
@@ -91,23 +92,25 @@ def keys_page() -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def _list_of_keys(rows: Iterable[tuple[str, Tree]], told: dict[str, str], kind: str) -> str:
-    """Keys of a kind of a section as a list. `told` has the lines of other kinds of the section by
-    key, each with its kind; equal ones are not repeated."""
+def _list_of_keys(
+    rows: Iterable[tuple[str, Tree]], told: dict[str, tuple[str, str]], kind: str
+) -> str:
+    """Keys of a kind of a section as a list. `told` has the kind that told a key with the same text
+    first, and its default there; the key is not told again, except for another default."""
     lines, again = [], dict[str, list[str]]()
     for key, node in rows:
-        default = json.dumps(node["default"]).strip('"') if "default" in node else ""
+        default = json.dumps(node["default"]).replace('"', "") if "default" in node else ""
         if default in ("null", "[]", "{}"):
             default = "optional"
         elif default:
             default = f"default {default}" if "unit" in node else f"default `{default}`"
-        value = _value(node) + (f"; {default}" if default else "")
-        line = f"- `{key}` ({value}): {' '.join(node['description'].split())}"
-        if line in told:
-            again.setdefault(told[line], []).append(f"`{key}`")
+        value, text = _value(node), " ".join(node["description"].split())
+        other, usual = told.setdefault(f"{key} {value} {text}", (kind, default))
+        if other == kind:
+            lines.append(f"- `{key}` ({'; '.join(filter(None, [value, default]))}): {text}")
         else:
-            lines.append(line)
-            told[line] = kind
+            differs = f" ({default})" if default != usual else ""
+            again.setdefault(other, []).append(f"`{key}`{differs}")
     lines += [f"- {listed(keys)}: as for `{first}`" for first, keys in again.items()]
     return "\n".join(lines)
 
@@ -126,15 +129,16 @@ def _value(node: Tree) -> str:
     words = unit or node.get("format") or _WORDS.get(str(node.get("type")), str(node.get("type")))
     if "items" in node:
         item = _value(node["items"])
-        words = f"list of ({item})" if "," in item else f"list of {item}"
+        item = f"({item})" if re.search(r",| or |×", item) else item
+        if "minItems" in node and node["minItems"] == node.get("maxItems"):
+            return f"{node['minItems']} × {item}"
+        words = f"list of {item}"
     if "enum" in node or "const" in node:
-        words = " or ".join(f"`{member}`" for member in node.get("enum", [node.get("const")]))
+        words = ", ".join(f"`{member}`" for member in node.get("enum", [node.get("const")]))
     limits = [text.format(plainest(node[n], unit)) for n, text in _LIMITS.items() if n in node]
     if {"minimum", "maximum"} <= node.keys():
         limits = [f"{plainest(node['minimum'], unit)} to {plainest(node['maximum'], unit)}"]
     lengths = [text.format(node[n]) for n, text in _LENGTHS.items() if n in node]
-    if len(lengths) == 2 and node["minItems"] == node["maxItems"]:
-        lengths = [f"{node['minItems']} items"]
     return ", ".join([words, *limits, *lengths])
 
 

@@ -118,8 +118,8 @@ class WalkMetrics:
         "body lengths per second",
         lambda walk: _mean_speed(walk) / walk.length if walk.length else math.nan,
     )
-    """Speed divided by the length of the robot, its largest extent along an axis at the start.
-    Robots of different sizes can be compared by it. NaN for a robot that is a point."""
+    """Speed divided by the length of the robot, its largest extent along an axis at the start; NaN
+    for a point."""
     twist: float = _of_poses(
         "m",
         "one rear foot ahead of the other",
@@ -150,8 +150,8 @@ class WalkMetrics:
     path_curvature: float = metric(
         "1/m", "1 / radius, left positive", lambda walk: curvature(walk.path, scale=walk.scale)
     )
-    """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive if
-    the path bends left as seen along the motion, even if the robot walks backward."""
+    """Curvature of the centre's path from `simulation.steady_from` on; positive if it bends left
+    along the motion, even if the robot walks backward."""
     cost_of_transport: float = metric(
         "", "work / (weight x distance)", _cost_of_transport, is_cost=True
     )

@@ -43,8 +43,7 @@ class SteadyState(OptimizerSettings):
     weight_mutation: float = Field(default=0.2, ge=0)
     """Largest change of a weight in one mutation."""
     tau_mutation: Literal["intended", "listing"] = "intended"
-    """Whether mutation changes tau_A: with `intended` it does; with `listing` it never does, like
-    the thesis's listing A.3.4."""
+    """Whether mutation changes tau_A, or never does, like the thesis's `listing` A.3.4."""
     tau_mutation_range: Time = Field(default=0.05, ge=0)
     """Largest change of tau_A in one mutation."""
     stop_rise: float = Field(default=0.03, ge=0)
@@ -70,8 +69,8 @@ class CmaEs(OptimizerSettings):
     """Size of the sample: the random gaits that are evaluated before each search."""
     starts: int = Field(default=5, ge=1, le=1000)
     """Number of searches that are tried out, for 1,000 evaluations each and half of all at most;
-    the one with the best gait continues. A search starts at the mean of the best quarter of its
-    sample; without a sample, the first in the middle of the ranges, the others at random gaits."""
+    the best continues. A search starts at the mean of the best quarter of its sample; without one,
+    in the middle of the ranges or at random gaits."""
 
 
 class RandomSearch(OptimizerSettings):

@@ -13,6 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from tetra_drake.laws.actuator import ActuatorKind, DrivenCables
+from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.settings.section import Kinds, Section
 
@@ -42,6 +43,10 @@ class DrivenRobots(NamedTuple):
     size: np.ndarray
     """Lengths of the first strut (N,)."""
 
+    def signals_of(self, setpoints: np.ndarray) -> np.ndarray:
+        """Signals (N, driven) in N from setpoints of the actuators."""
+        return np.asarray(self.actuation.signals(setpoints, self.cables.law), dtype=float)
+
     def as_given(self, signals: np.ndarray) -> np.ndarray:
         """Signals (N, driven) in N for robots without a network, from signals like a network's. For
         motors that imitate a cable's spring, they are the whole tension at the start's length."""
@@ -57,6 +62,10 @@ class PolicyKind(Section):
         """Names of the policy's parameters for a robot, with their bounds in random policies. A
         search may leave the bounds."""
         raise NotImplementedError
+
+    def gait_parameters(self, blueprint: Blueprint) -> Mapping[str, GaitParameter]:
+        """The same as parameters of a gait."""
+        return {key: GaitParameter(*pair) for key, pair in self.parameters(blueprint).items()}
 
     def signals(self, robots: DrivenRobots, readings: Any, values: np.ndarray) -> np.ndarray:
         """Signals (N, driven) in N of robots, from their robot.readings.Readings, and the

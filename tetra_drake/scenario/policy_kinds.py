@@ -8,15 +8,15 @@ import math
 import os
 import sys
 from collections.abc import Callable, Mapping
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, checked_numbers
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.policies import DrivenRobots, PolicyBounds, PolicyKind, driven_names
-from tetra_drake.settings.quantities import Time
+from tetra_drake.settings.quantities import PAIR, Time
 from tetra_drake.settings.refusals import refuse
 
 MOST_PARAMETERS = 100_000
@@ -68,9 +68,8 @@ class SensingPolicy(PolicyKind):
 
     readings: list[Reading] = Field(default=["clock", "lengths", "normal_forces"], min_length=1)
     """Readings that the policy gets; see the class Readings. `clock` is sine and cosine of a clock.
-    Lengths of cables are changes since the start, as shares; rates are shares per second. Forces
-    are in units of the robot's weight, positions of nodes from the robot's centre in units of the
-    first strut, velocities in this unit per second."""
+    Lengths are changes since the start, as shares. Forces are in units of the robot's weight,
+    positions of nodes from the robot's centre in units of the first strut."""
     clock: Time = Field(default=1.0, gt=0)
     """Period of the clock."""
 
@@ -163,15 +162,8 @@ class PythonPolicy(PolicyKind):
     are found."""
     count: int = Field(ge=1, le=MOST_PARAMETERS)
     """Number of parameters."""
-    bounds: list[float] = Field(default=[-1.0, 1.0], min_length=2, max_length=2)
+    bounds: Annotated[list[float], *PAIR] = Field(default=[-1.0, 1.0])
     """Least and greatest parameter in random policies."""
-
-    @model_validator(mode="after")
-    def _check_bounds(self) -> PythonPolicy:
-        low, high = self.bounds
-        if low >= high:
-            refuse("bounds", f"found {low} and {high}, expected the least one first")
-        return self
 
     def parameters(self, blueprint: Blueprint) -> Mapping[str, PolicyBounds]:
         low, high = self.bounds
@@ -179,16 +171,8 @@ class PythonPolicy(PolicyKind):
 
     def signals(self, robots: DrivenRobots, readings: Any, values: np.ndarray) -> np.ndarray:
         given = imported_function(self.function)(readings, values, robots)
-        actions, shape = np.asarray(given), robots.rest.shape
-        if actions.shape != shape or actions.dtype.kind not in "iuf":
-            found = f"an array of {actions.dtype} of shape {actions.shape}"
-            problem = f"returned {found}, expected numbers of shape {shape}"
-            raise InputError("policy.function", self.function, problem)
-        if not np.isfinite(actions).all():
-            time = readings.time[np.argwhere(~np.isfinite(actions))[0][0]]
-            problem = f"returned a number that is not finite, at {time:g} s"
-            raise InputError("policy.function", self.function, problem)
-        return np.asarray(robots.actuation.signals(actions, robots.cables.law), dtype=float)
+        source, key, shape = "policy.function", self.function, robots.rest.shape
+        return robots.signals_of(checked_numbers(given, shape, source=source, key=key, finite=True))
 
 
 @functools.cache

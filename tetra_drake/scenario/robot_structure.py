@@ -104,14 +104,13 @@ class StrutGroup(Section):
     file."""
     contact_radius: Length | None = Field(default=None, ge=0)
     """Radius of the sphere about each end that touches the ground; by default the sphere's radius,
-    else the strut's; 0 for nodes that anchors hold along z. With 0 the ground acts on the centres
-    of nodes. A bar with round ends rolls about its axis, if no cable is off the axis."""
+    else the strut's; 0 for nodes that anchors hold along z. With 0 the ground acts on the nodes."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
     """Axial force per shortening of a strut, E A / l; none for rigid struts. A strut without load
-    is as long as the distance of its nodes in the file. Its force shortens it in equilibrium, and
-    natural frequencies include its stiffness; in motion it keeps its length. Frequencies leave out
-    the inertia of its elongation: if a strut is 17, 3.3 or 1 times as stiff as its cable, the first
-    is 0.25, 1.2 or 4 % higher than with finite-element rods, the second 0.75, 3.7 or 12 %."""
+    is as long as its nodes are apart in the file. Its force shortens it in equilibrium, and natural
+    frequencies include its stiffness, not the inertia of its elongation: if it is 17, 3.3 or 1
+    times as stiff as its cable, the first is 0.25, 1.2 or 4 % higher than with finite-element rods,
+    the second 0.75, 3.7 or 12 %. In motion it keeps its length."""
 
 
 class SphereGroup(Section):
@@ -199,10 +198,9 @@ class JoinedBody(Section):
     centre: Coordinates | None = None
     """Centre of mass [x, y, z] where the nodes are as in the file."""
     inertia: Annotated[list[InertiaQuantity], Field(min_length=3, max_length=6)] | None = None
-    """Moments of inertia [xx, yy, zz], or with the matrix's products [xx, yy, zz, xy, xz, yz] (xy
-    is the integral of -x y dm), about the centre of mass, along the axes of the file, where the
-    nodes are as in the file. By default the inertia of the parts grows in proportion to the
-    mass."""
+    """Moments of inertia [xx, yy, zz], or also the matrix's products xy, xz, yz (xy is the integral
+    of -x y dm), about the centre of mass, along the axes of the file. By default the parts' inertia
+    in proportion to the mass."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> JoinedBody:
@@ -248,8 +246,7 @@ class StructureFile(RobotSettings):
     joints: Keyed[Name, BallJoint] = Field(default={})
     pinned: list[str] = Field(default=[], exclude=True)
     """Nodes at which ball joints hold struts together; elsewhere struts that share a node are one
-    body. The first strut's body has the node; each other body has a copy, such as n-2 and n-3 for
-    n, and a joint with the same name."""
+    body. Each body but the first gets a copy of the node, such as n-2, and a joint of this name."""
     joint_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
     """Stiffness of pinned nodes, and of joints that give none. The default is the same as for
     anchors."""
@@ -265,16 +262,13 @@ class StructureFile(RobotSettings):
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
-    """Axes along which the world holds nodes, such as xyz: a node of a strut by a spring and a
-    damper from its place in the file; a node of no strut is fixed there."""
+    """Axes along which the world holds nodes, such as xyz: nodes of struts by a spring and a
+    damper, others are fixed."""
     anchor_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness that holds a node of a strut along each axis of its anchor. By default 1000 times
-    the stiffness of all cables, at least so great that the robot's weight moves the node by 0.01 mm
-    per metre of the robot's length, and at most 1e8 / s² times the mass of the lightest body, or
-    1000 times the stiffest cable."""
+    """Stiffness that holds a node of a strut along each axis of its anchor. The default follows the
+    robot: 1000 times the stiffness of all cables, or more for its weight; see FORMAT.md."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
-    """Ratio of damping to stiffness of an anchor. With less than 1 ms, a stiff anchor vibrates, and
-    steps are short."""
+    """Ratio of damping to stiffness of an anchor; as for joints."""
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
     gravity: Acceleration = Field(default=9.80665, ge=0)
@@ -283,12 +277,11 @@ class StructureFile(RobotSettings):
     """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
     its anchors."""
     ignored: list[str] | None = None
-    """Settings of an imported file that have no effect, as the scenario has its own friction,
-    ground and actuators; noted when the file is read."""
+    """Settings of an imported file that have no effect, such as friction; noted when the file is
+    read."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key, such as `cables.side.stiffness: 2 %`,
-    `struts.bar.length: 1 mm` or `nodes: 1 mm`; or in the text of a number: `200 N/m ± 2 %`.
-    td.predict and td.fit use them; the robot does not change."""
+    """Tolerances of numbers of the robot by key, such as `cables.side.stiffness: 2 %` or `nodes: 1
+    mm`; or in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.

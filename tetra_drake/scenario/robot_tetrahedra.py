@@ -99,9 +99,8 @@ class Tetrahedra(RobotSettings):
     """Density of struts and spheres."""
     cables: RowCables
     spacing: Annotated[Spacing, Varied()] = Field(ge=0)
-    """Distance between base triangles at t = 0. `balanced` (or 0): where the cables balance; also
-    the default in a file that changes the strut length, or the cables' stiffness or free length, of
-    its base."""
+    """Distance between base triangles at t = 0. `balanced` (or 0): where the cables balance, as in
+    a file that changes its base's strut length, or cables' stiffness or free length."""
     gravity: Acceleration = Field(ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
@@ -110,8 +109,7 @@ class Tetrahedra(RobotSettings):
     """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
-    tip of the foremost, the only ones that reach flat ground. `all`: all four of every
-    tetrahedron."""
+    foremost tip, which reach flat ground. `all`: all four."""
     actuation: list[Annotated[list[CableName], Field(min_length=1)]] = Field(
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )

@@ -119,7 +119,8 @@ class Scenario(World):
         is empty exactly if the scenarios are equal, apart from their names.
         """
         ours, theirs = self.values(), base.values()
-        kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs.get(key)]
+        tags = [key for key in {**ours, **theirs} if key.endswith(f".{TAG}")]
+        kinds = [key for key in tags if ours.get(key) != theirs.get(key)]
         other_kinds = tuple(key.removesuffix(TAG) for key in kinds)
         found = []
         for key in dict.fromkeys([*ours, *theirs]):
@@ -157,8 +158,11 @@ class Scenario(World):
 
     @functools.cached_property
     def parameters(self) -> Mapping[str, GaitParameter]:
-        """Parameters of a gait by name, with the bounds of `gait_bounds`; see World.parameters."""
-        return self.parameters_within(self.gait_bounds)
+        """Parameters of a gait by name: of the policy if there is one, otherwise of the
+        oscillators."""
+        if self.policy is not None:
+            return self.policy.gait_parameters(self.blueprint())
+        return self.cpg.parameters(self.blueprint(), self.gait_bounds)
 
     _split = model_validator(mode="before")(split_tolerances)
     _check_known = model_validator(mode="after")(check_tolerances)
@@ -182,6 +186,8 @@ class Scenario(World):
         if bounds.turn != 0.0 and not blueprint.sides.any():
             expected = "expected 0, as no group is on one side"
             refuse("gait_bounds.turn", f"found {bounds.turn}, {expected}")
+        if bounds.mirrored and not self.cpg.mirrors:
+            refuse("gait_bounds.mirrored", f"found true, expected false for !{self.cpg.tag}")
         if bounds.mirrored and None in blueprint.images:
             oscillator = blueprint.oscillators[blueprint.images.index(None)]
             expected = f"expected false, as '{oscillator}' has no mirror image"

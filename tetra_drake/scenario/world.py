@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 import operator
 from collections.abc import Mapping, Sequence
@@ -16,9 +15,7 @@ from tetra_drake.laws.actuator import Actuation, Force
 from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
-from tetra_drake.laws.matsuoka import Matsuoka
-from tetra_drake.laws.oscillator import CpgKind, GaitBounds, GaitParameter
-from tetra_drake.laws.phase import Phase
+from tetra_drake.laws.oscillator import CpgKind
 from tetra_drake.laws.terrain import Flat, Terrain
 from tetra_drake.scenario.blueprint import Blueprint, cable_numbers
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
@@ -43,7 +40,8 @@ MOST_SAMPLES = 2_000_000
 """Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
 
 
-Cpg = Annotated[Matsuoka | Phase, Kinds(CpgKind, plain=True)]
+_CPGS = ["tetra_drake.laws.matsuoka:Matsuoka", "tetra_drake.laws.phase:PhaseOscillators"]
+Cpg = Annotated[CpgKind, Kinds(CpgKind, more=_CPGS, plain=True)]
 """Oscillators of any kind, with their settings. A mapping without a tag is a !Matsuoka, and written
 so."""
 
@@ -115,20 +113,6 @@ class World(Section):
         numbers = cable_numbers(names)
         cut = {numbers[name] for event in self.events for name in event.cut}
         return [name for number, name in enumerate(names) if number not in cut]
-
-    @functools.cached_property
-    def parameters(self) -> Mapping[str, GaitParameter]:
-        """Parameters of a gait by name: of the policy if there is one, otherwise of the
-        oscillators."""
-        return self.parameters_within(None)
-
-    def parameters_within(self, bounds: GaitBounds | None) -> Mapping[str, GaitParameter]:
-        """Parameters of a gait by name. Random gaits are within `bounds`, if there are any."""
-        blueprint = self.blueprint()
-        if self.policy is None:
-            return self.cpg.parameters(blueprint, bounds)
-        pairs = self.policy.parameters(blueprint)
-        return {name: GaitParameter(*pair) for name, pair in pairs.items()}
 
     def blueprint(self) -> Blueprint:
         """The blueprint of the robot, without contact nodes if there is no ground."""

@@ -10,7 +10,14 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
 
 import pydantic
-from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, WrapValidator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PlainSerializer,
+    ValidationInfo,
+    WrapValidator,
+)
 from pydantic_core import CoreSchema, core_schema
 
 from tetra_drake.settings.refusals import described
@@ -72,7 +79,7 @@ InertiaQuantity = Annotated[float, *quantity("kg*m^2")]
 Density = Annotated[float, *quantity("kg/m^3")]
 Time = Annotated[float, *quantity("s")]
 Frequency = Annotated[float, *quantity("Hz")]
-Rate = Annotated[float, *quantity("1/s")]
+InverseTime = Annotated[float, *quantity("1/s")]
 Speed = Annotated[float, *quantity("m/s")]
 InverseSpeed = Annotated[float, *quantity("s/m")]
 Acceleration = Annotated[float, *quantity("m/s^2")]
@@ -83,6 +90,17 @@ DampingPerLength = Annotated[float, *quantity("N*s/m^2")]
 
 Position = Annotated[list[Length], Field(min_length=3, max_length=3)]
 """Coordinates x, y and z."""
+
+
+def _ascending(pair: list[float]) -> list[float]:
+    low, high = pair
+    if low > high:
+        raise ValueError(f"found {low:g} to {high:g}, expected the least value first")
+    return pair
+
+
+PAIR = Field(min_length=2, max_length=2), AfterValidator(_ascending)
+"""Annotations of a list with a least and a greatest value."""
 
 EMPTY: dict[str, Any] = {"type": ["object", "null"]}
 """JSON Schema of a mapping that may be left empty in a file."""

@@ -54,8 +54,10 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
         default = node.get("default")
         if "anyOf" in node and isinstance(default, dict):
             del node["default"]
-        if "unit" in node and isinstance(default, float):
-            node["default"] = plainest(default, node["unit"])
+        items = node.get("items")
+        unit = node.get("unit") or (isinstance(items, dict) and items.get("unit"))
+        if unit and isinstance(default, (float, list)):
+            node["default"] = mapped(default, functools.partial(plainest, unit=unit))
     texts = attribute_docstrings(section)
     for name, field in section.model_fields.items():
         if name in texts:

@@ -1,6 +1,7 @@
 """LeafSystems of the diagram: ports, state and events. The laws are in `laws`.
 
-All names here are public. In the order of the signal flow: Steering, MatsuokaCpg, StartUpGate,
+All names here are public. In the order of the signal flow: Steering, MatsuokaCpg (OscillatorCpg for
+other kinds of oscillators), StartUpGate,
 CableNetwork, GroundContact and StateForces around a MultibodyPlant, and Feedback back to the
 network; HeldSignals or SampledController in place of a network. AddCables, AddGroundContact and
 Attach add them to any plant; diagram.MakeTensegrityDiagram() wires a robot.

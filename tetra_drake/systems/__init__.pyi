@@ -3,6 +3,7 @@
 # ruff: noqa: I001
 from tetra_drake.systems.steering import Steering as Steering
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg as MatsuokaCpg
+from tetra_drake.systems.oscillator_cpg import OscillatorCpg as OscillatorCpg
 from tetra_drake.systems.start_up_gate import StartUpGate as StartUpGate
 from tetra_drake.systems.cable_network import CableNetwork as CableNetwork
 from tetra_drake.systems.ground_contact import GroundContact as GroundContact

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import NoneType
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,16 +21,16 @@ from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.matsuoka import Matsuoka
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import gains_of, signal_samples
+from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.attachment import Attach
 from tetra_drake.systems.cable_network import AddCables, Cable
-from tetra_drake.systems.cpg import Cpg
 from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import AddGroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
+from tetra_drake.systems.oscillator_cpg import OscillatorCpg
 from tetra_drake.systems.start_up_gate import StartUpGate
 from tetra_drake.systems.state_forces import StateForces
 from tetra_drake.systems.steering import Steering
@@ -69,7 +68,7 @@ def MakeTensegrityDiagram(
     Subsystems:
 
     - cpg: only with a gait. With `cpg.signals: live` in the scenario, it is the network, integrated
-      with the robot (a live network): a MatsuokaCpg, or a Cpg for other kinds of oscillators.
+      with the robot (a live network): a MatsuokaCpg, or an OscillatorCpg for other kinds.
       Otherwise it is the network's signals, computed beforehand. A robot without oscillators has no
       cpg.
     - steering: only for a live network with oscillators on the left or right
@@ -175,7 +174,8 @@ def MakeTensegrityDiagram(
         actuators = builder.GetSubsystemByName("cables_actuators")
         builder.ExportOutput(actuators.get_output_port(), "drives")
     if builder.HasSubsystemNamed("cpg") and scenario.cpg.feedback:
-        feedback = Feedback(robot, gains=gains_of(gait))
+        assert gait is not None
+        feedback = Feedback(robot, gains=robot.oscillators(gait).gains)
         _AddFeedback(builder, feedback, state, signals, ground)
 
     builder.ExportOutput(state, "state")
@@ -340,15 +340,11 @@ def _AddSignals(
     if cpg.signals == "live":
         robot.turns(gait, steering)  # raises InputError for a wrong turn
         network = robot.oscillators(gait)
-        given: dict[str, Any] = {
-            "tonic": np.full(2 * size, cpg.tonic),
-            "initial_state": robot.starting_oscillators(gait),
-            "gain": cpg.gain,
-        }
-        is_matsuoka = network.own is Matsuoka.own
-        oscillators = builder.AddNamedSystem(
-            "cpg", MatsuokaCpg(network.constants, **given) if is_matsuoka else Cpg(network, **given)
-        )
+        tonic, start = np.full(2 * size, cpg.tonic), network.start
+        made = OscillatorCpg(network, tonic=tonic, gain=cpg.gain)
+        if network.own is Matsuoka.own:
+            made = MatsuokaCpg(network.constants, tonic=tonic, initial_state=start, gain=cpg.gain)
+        oscillators = builder.AddNamedSystem("cpg", made)
         if robot.structure.sides.any():
             turn = gait.turn if steering is None else steering
             steers = builder.AddNamedSystem("steering", Steering(robot.tonic_input, turn=turn))

@@ -9,10 +9,10 @@ from pydrake.systems.framework import Context
 from tetra_drake.laws.matsuoka import Matsuoka, Network
 from tetra_drake.laws.oscillator import Oscillators
 from tetra_drake.systems.attachment import DeclareOutput
-from tetra_drake.systems.cpg import Cpg
+from tetra_drake.systems.oscillator_cpg import OscillatorCpg
 
 
-class MatsuokaCpg(Cpg):
+class MatsuokaCpg(OscillatorCpg):
     """Network of n Matsuoka oscillators (thesis Eq. 7-9).
 
     | port     | in, out | shape | unit | meaning                                               |
@@ -24,8 +24,8 @@ class MatsuokaCpg(Cpg):
     | neurons  | out     | (2n,) | 1    | outputs y = max(0, u) of the neurons                  |
 
     Neurons 2k and 2k + 1 are the extensor and the flexor of oscillator k, from 0 on. The continuous
-    state is u (2n,), then v (2n,): inner states and self-inhibitions. See Cpg for what it has in
-    common with other kinds, and diagrams/entrainment.py for a loop around a single oscillator.
+    state is u (2n,), then v (2n,): inner states and self-inhibitions. OscillatorCpg says what all
+    kinds have in common, and diagrams/entrainment.py has a loop around a single oscillator.
     """
 
     def __init__(
@@ -44,8 +44,9 @@ class MatsuokaCpg(Cpg):
             expected = f"({2 * neurons},) for {neurons} neurons"
             raise ValueError(f"found initial_state of shape {shape}, expected {expected}")
         inputs = np.full(neurons, tonic, dtype=float)
-        oscillators = Oscillators(Matsuoka.own, network)
-        super().__init__(oscillators, tonic=inputs, initial_state=initial_state, gain=gain)
+        start = np.array(initial_state, dtype=float)
+        oscillators = Oscillators(Matsuoka.own, network, start, gains=np.zeros(0))
+        super().__init__(oscillators, tonic=inputs, gain=gain)
         DeclareOutput(self, "neurons", neurons, MatsuokaCpg._outputs, {self.xc_ticket()})
 
     def _outputs(self, context: Context) -> np.ndarray:

@@ -27,8 +27,8 @@ class HeldSignals(ConvertibleSystem):
     | signals | out     | (m,)  | N    | actuator signals, one per group of driven cables   |
 
     After Hold(), the output changes linearly from the old signals to the new ones, within one
-    network step, the scenario's `cpg.listing_step` (s). Only at t = 0 it changes at once. The
-    actions of engines.simulation.Simulation act in the same way.
+    network step, the scenario's `cpg.listing_step` (s). Only at t = 0 it changes at once. Commands
+    and the actions of engines.simulation.Simulation act in the same way.
 
     The discrete state (2m + 1,) is the m signals before the latest change, the m signals after it,
     and the time (s) of its beginning. At the start both are the robot's first signals. The output
@@ -90,7 +90,8 @@ class SampledController(HeldSignals):
         self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
         self._ground = self.DeclareVectorInputPort("ground_forces", GROUND_FORCE_COLUMNS * contacts)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
-        self.DeclarePeriodicPublishEvent(period, self._change, lambda _: None)  # ends a step
+        # Ends a step. At t = 0 nothing changes.
+        self.DeclarePeriodicPublishEvent(period, period + self._change, lambda _: None)
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         readings = Readings.of(

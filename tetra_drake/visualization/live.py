@@ -36,7 +36,7 @@ _POLLING_PERIOD = 0.1  # s, while no browser is connected
 class LiveView:
     """Viewer that shows a simulation in Meshcat, not faster than real time.
 
-    An engine calls wants() and show() (see engines.batch.Viewer). The simulation waits until a
+    An engine calls wants() and show() (see engines.engine.Viewer). The simulation waits until a
     browser is connected.
     """
 

@@ -80,7 +80,7 @@ Ending = tuple[SimulationResult | SimulationFailure, Motion]
 
 def batch_of(first: DrivenRobot) -> LaneBatch:
     """A batch of one thread for robots like the first one."""
-    return LaneBatch([first], places=processor_lanes(), record=True, threads=1)
+    return LaneBatch(first, places=processor_lanes(), record=True)
 
 
 def endings(walks: list[DrivenRobot]) -> list[Ending]:
@@ -93,7 +93,7 @@ def endings(walks: list[DrivenRobot]) -> list[Ending]:
             in_place[place], walk = waiting.pop(0)
             assert batch.begin(place, walk)
         batch.advance(briefly=True)
-        for place in filter(batch.ended, list(in_place)):
+        for place in filter(batch.ended.__getitem__, list(in_place)):
             try:
                 outcome = batch.result(place)
             except SimulationFailure as failure:

@@ -12,21 +12,19 @@ import functools
 import math
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 from numba.core import registry
 
-from tetra_drake.engines.batch import Batch, Tables, Viewer
-from tetra_drake.engines.engine import Engine
+from tetra_drake.engines.engine import SAME_TIME, Engine, Viewer
 from tetra_drake.engines.lanes import loop
 from tetra_drake.engines.lanes.places import LAST, NEXT, ROUND, Memory, Places, advance
 from tetra_drake.engines.lanes.prepared import Prepared
 from tetra_drake.engines.lanes.tables import in_lanes, numbered, numbers_of, views
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.lanes import FieldArray
 from tetra_drake.kernels.packed import Packed, allocate
@@ -34,13 +32,11 @@ from tetra_drake.laws.actuator import DRIVE
 from tetra_drake.laws.terrain import SurfaceGrid
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.command import driven_robot
-from tetra_drake.robot.parameter_space import seeded_gait
+from tetra_drake.robot.command import policy_signals
 from tetra_drake.robot.readings import Readings, bodies_state
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import Phase
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.structure import with_origins
-from tetra_drake.scenario.scenario import Scenario
 
 FIRST = SurfaceGrid._fields.index("first")
 """Column of Ground.grid with the index of a robot's first terrain height. It differs between
@@ -50,6 +46,9 @@ _SPARE_MARKS = 4
 """Number of marks (times at which a step must end) that a robot may have more than the first robot
 of the batch."""
 
+_HISTORY = ("times", "states", "signals", "modes", "drives")
+"""Tables of the log that are the recorded motion of robots, fields of Motion."""
+
 _NEVER = 1e300
 """Time (s) of the next sample of a robot without samples. At an infinite one a motion ends."""
 
@@ -58,25 +57,44 @@ _BODY_STEPS = 25_000
 calls Python handles signals of the operating system and checks time limits."""
 
 
-class LaneBatch(Batch):
-    """Batch of the compiled engine. Each thread simulates 4 or 8 robots at once, in lanes."""
+class LaneBatch:
+    """Robots that the compiled engine simulates side by side. Each thread simulates 4 or 8 robots
+    at once, in lanes.
+
+    A batch has a fixed number N of places, numbered from 0. Each robot is in a place; a place
+    without a robot is idle. Robots pause and go on; their states can be saved and restored.
+    """
 
     def __init__(
         self,
-        robots: Sequence[DrivenRobot],
+        robot: DrivenRobot,
         *,
-        places: int | None = None,
+        places: int = 1,
         record: bool = False,
         threads: int = 1,
     ) -> None:
-        """Puts robots at their start; for the arguments see Engine.start(). Compiles the kernel if
-        necessary."""
-        places = places or len(robots)
-        first = self._first = Prepared.of(robots[0], record=record)
-        super().__init__(first.driven.robot.structure, places)
-        self._prepared: list[Prepared | None] = [None] * places
+        """Puts a robot at its start in the first place. Compiles the kernel if necessary.
+
+        Args:
+            robot: the first robot; all have the same structure and kinds of laws.
+            places: number of robots that the batch can hold. The other places are idle until
+                begin().
+            record: records the trajectories, for the results.
+            threads: number of threads that share the robots.
+        """
+        first = self._first = Prepared.of(robot, record=record)
+        self.readings = Readings.empty(robot.robot.structure, places)
+        """Readings of all robots at their last pause. At the start only the times are set."""
+        self.failures: list[SimulationFailure | None] = [None] * places
+        """Failure of the robot in each place; None if it has not failed."""
+        self._prepared: dict[int, Prepared] = {}
+        """Robots by their places."""
+        self._phases = np.zeros(places, dtype=int)
+        """Number of events that have changed the robot in each place, its index in Robot.phases."""
+        self._events, self._actions = np.full((2, places), math.inf)
+        """Times (s) of the next event, and of the next action of the policy, in each place;
+        infinite if there is none."""
         self._ends, self._wall_times, self._tried = np.zeros((3, places))
-        self._controlled = np.zeros(places, dtype=bool)
         state, constants = numbered(first.start), numbered(first.constants)
         self._tally = int(state.tally.begins[0])
         self._first_height = int(constants.robot.ground.grid[FIRST])
@@ -96,9 +114,15 @@ class LaneBatch(Batch):
         self._threads = [LaneThread(first, *tables) for _ in range(min(threads, places))]
         self._process: int | None = None
         """The process that has started the pool of threads. A fork needs a pool of its own."""
-        self._begin_all(robots)
+        self.begin(0, robot)
 
     def begin(self, place: int, robot: DrivenRobot) -> bool:
+        """Puts a robot at its start into a place of the batch.
+
+        Returns False, and changes nothing, if the robot differs too much from the first one of the
+        batch: it has another structure or kind of law, or needs larger tables, such as of terrain
+        heights.
+        """
         first, log = self._first, self._log
         same = [known for known in (first, self._latest) if known.driven is robot]
         prepared = self._latest = same[0] if same else first.like(robot)
@@ -126,71 +150,165 @@ class LaneBatch(Batch):
         self._prepared[place], self._ends[place] = prepared, marks[-1]
         self.readings.time[place] = 0.0
         self._wall_times[place] = self._tried[place] = 0.0
-        self._controlled[place] = robot.is_controlled
-        self._follow(place, robot)
+        self._phases[place], self._events[place] = 0, _begin(robot.robot.phases[1:])
+        self._actions[place] = robot.pilot.acts_after(0.0) if robot.pilot else math.inf
         return True
+
+    def advance(
+        self,
+        until: float | np.ndarray = math.inf,
+        signals: np.ndarray | None = None,
+        *,
+        briefly: bool = False,
+    ) -> None:
+        """Simulates each robot until its time in `until`, the end of its simulation, or a failure.
+        Robots change at the times of their scenario's events, and their policies act.
+
+        Calls time_limit.check_time() often, which raises TimeBudgetExceeded.
+
+        Args:
+            until: simulated times (s), for each place (N,) or for all. A robot that has reached its
+                time pauses.
+            signals: m actuator signals (N, m) of robots without a gait or a command, which are
+                forces in newtons. They change linearly from the old ones within one network step,
+                `cpg.listing_step`, and are then constant. A robot that pauses ignores them.
+            briefly: returns as soon as a robot has ended, after some 30 ms of wall time, or at the
+                next event or action of a policy.
+        """
+        until = np.broadcast_to(until, len(self.failures))
+        if signals is not None:
+            self._hold(until, signals)
+        while True:
+            self._pass_events()
+            self._act()
+            instants = np.minimum(self._events, self._actions)
+            # The policies act together: their robots wait for each other.
+            waits = bool(np.isfinite(self._actions).any())
+            self._advance(np.minimum(until, instants), briefly=briefly and not waits)
+            self._events[self.ended] = self._actions[self.ended] = math.inf
+            instants = np.minimum(self._events, self._actions)
+            if briefly or not (np.isfinite(instants) & (instants <= until)).any():
+                return
+
+    def _pass_events(self) -> None:
+        """Changes the robots that are at the time of an event."""
+        while places := self._places_at(self._events):
+            for place in places:
+                self._enter(place, self._phases[place] + 1)
+
+    def _act(self) -> None:
+        """Lets the policies act whose robots are at the time of an action."""
+        if not (places := self._places_at(self._actions)):
+            return
+        pilots = [pilot for place in places if (pilot := self._prepared[place].driven.pilot)]
+        signals, until = np.zeros_like(self._places.signals), np.zeros_like(self._times)
+        signals[places] = policy_signals(pilots, self.readings.rows(places))
+        until[places] = math.inf
+        self._hold(until, signals)
+        for place, pilot in zip(places, pilots, strict=True):
+            self._actions[place] = pilot.acts_after(self._actions[place])
+
+    def _places_at(self, instants: np.ndarray) -> list[int]:
+        """Places whose robots are at their time (s) in `instants`."""
+        return np.flatnonzero(self.readings.time >= instants - SAME_TIME).tolist()
 
     def _put_constants(self, place: int, constants: loop.Constants) -> None:
         self._places.constants[place] = numbers_of(constants)
         self._places.constants[place, self._first_height] = place * self._heights.shape[1]
 
-    def _become(self, place: int, robot: Robot, p_BC: np.ndarray) -> None:
+    def _enter(self, place: int, number: int) -> None:
+        """Changes the robot in a place into what it is after this number of events. Its nodes move
+        on in the same way; the origins of its bodies' frames move to their new centres of mass."""
         prepared = self._prepared[place]
-        assert prepared is not None
+        phases = prepared.driven.robot.phases
+        robot, p_BC = phases[number].robot, phases[number].p_BC - phases[self._phases[place]].p_BC
         model = robot.model._replace(ground=robot.ground._replace(heights=None))
-        changed = prepared.constants._replace(robot=model, senses=robot.senses)
-        self._put_constants(place, changed)
+        self._put_constants(place, prepared.constants._replace(robot=model, senses=robot.senses))
         bodies = self._places.states[place, -13 * len(p_BC) :]  # step.state, the last numbers
         bodies[:] = with_origins(bodies, p_BC)
+        self._phases[place], self._events[place] = number, _begin(phases[number + 1 :])
 
-    def _rename(self, place: int, driven: DrivenRobot) -> None:
-        prepared = self._prepared[place]
-        assert prepared is not None
-        self._prepared[place] = dataclasses.replace(prepared, driven=driven)
+    def change(self, place: int, driven: DrivenRobot) -> None:
+        """Lets the robot in a place go on as `driven`, which differs from it only by cuts of cables
+        now."""
+        phases, now = driven.robot.phases, self.readings.time[place] + SAME_TIME
+        self._prepared[place] = dataclasses.replace(self._prepared[place], driven=driven)
+        self._phases[place] = sum(phase.begins <= now for phase in phases) - 1
+        self._enter(place, self._phases[place])
 
-    def _save(self, places: Sequence[int]) -> dict[str, np.ndarray]:
-        states = self._places.states[places]
+    def save(self, places: Sequence[int], *, history: bool) -> dict[str, np.ndarray]:
+        """The states of controlled robots that pause, as tables; the first axis is `places`. With
+        `history` they have the motion so far. Raises InputError if it is unknown."""
+        states, log = self._places.states[places], self._log
         states[:, loop.DUE] = _NEVER  # it depends on what is recorded
-        return {"states": states, "held": self._places.signals[places]}
+        saved = {"states": states, "held": self._places.signals[places]}
+        saved["phase"] = self._phases[places]
+        for name, table in self.readings._asdict().items():
+            saved[f"readings.{name}"] = table[places]
+        if history:
+            self._check_history(places, key="history")
+            kept = saved["history.kept"] = log.kept[places]
+            for name in _HISTORY:
+                table = saved[f"history.{name}"] = getattr(log, name)[places, : kept.max(initial=0)]
+                for row, known in enumerate(kept):
+                    table[row, known:] = 0.0  # left from a robot before
+        return saved
 
-    def _restore(self, places: Sequence[int], saved: Tables) -> None:
-        log, states = self._log, self._places.states
-        states[places], self._places.signals[places] = saved["states"], saved["held"]
-        self._places.holds[places], log.change_ends[places] = 0, 0.0
-        self._tried[places] = states[places, loop.TRIED]
+    def restore(self, places: Sequence[int], saved: Mapping[str, np.ndarray]) -> None:
+        """Puts robots into states of save(). Places must have the same robots, which have not
+        failed."""
+        for place, number in zip(places, saved["phase"].tolist(), strict=True):
+            if number != self._phases[place]:
+                self._enter(place, number)
+        for name, table in self.readings._asdict().items():
+            table[places] = saved[f"readings.{name}"]
+        self._go_on(places, saved["states"], saved["held"])
+        self._note_failures()
+        for row, place in enumerate(places if "history.kept" in saved else ()):
+            kept = self._log.kept[place] = saved["history.kept"][row]
+            for name in _HISTORY:
+                getattr(self._log, name)[place, :kept] = saved[f"history.{name}"][row, :kept]
+            self._places.states[place, loop.DUE] = self._log.times[place, kept]
+
+    def _go_on(self, places: Sequence[int], states: np.ndarray, held: np.ndarray) -> None:
+        """Puts robots into states (places, numbers), with the signals (places, m) in N that are
+        held, without the motions before."""
+        log = self._log
+        self._places.states[places], self._places.signals[places] = states, held
+        self._places.holds[places], log.change_ends[places], log.kept[places] = 0, 0.0, 0
+        self._tried[places] = states[:, loop.TRIED]
         # A mark is passed as soon as a step has ended there.
-        log.passed[places] = (log.marks[places] <= states[places, loop.TIME, None]).sum(axis=1)
-
-    def _remember(self, place: int, motion: Motion) -> None:
-        kept = self._log.kept[place] = len(motion.times)
-        for name in ("states", "signals", "modes", "drives"):
-            getattr(self._log, name)[place, :kept] = getattr(motion, name)
-        self._places.states[place, loop.DUE] = self._log.times[place, kept]
+        log.passed[places] = (log.marks[places] <= states[:, loop.TIME, None]).sum(axis=1)
 
     def assume(self, place: int, time: float, readings: Readings) -> None:
-        robot, prepared = self._phases[place][0].robot, self._prepared[place]
-        assert prepared is not None
-        start, row = prepared.start, self._places.states[place]
+        """Puts the robot in a place into the motion of other readings at a time (s). Its actuators
+        keep their states. A contact node that touches the ground sticks."""
+        start, row = self._prepared[place].start, self._places.states[place]
+        robot = self._prepared[place].driven.robot.phases[self._phases[place]].robot
         clock, modes, *_, tally, state = views((*start[:7], start.step.state), row)
         state[:] = bodies_state(readings, robot.structure)
         modes[:] = 0.0  # what touches the ground touches down in the next step
         clock[loop.TIME], clock[loop.PLANNED] = time, start.clock[loop.PLANNED]
         clock[loop.TRIED], clock[loop.ACTIVE], tally.time[0] = 0.0, 1.0, time
-        self._restore([place], self._save([place]))
+        clock[loop.DUE] = _NEVER
+        self._go_on([place], row[np.newaxis].copy(), self._places.signals[[place]])
         self.readings.put(place, readings._replace(time=time))
-        self.has_history[place] = False
 
     def stop(self, place: int) -> float:
+        """Removes the robot and its failure from a place, which becomes idle. Returns the wall time
+        (s) that the robot has taken."""
         for thread in self._threads:
             thread.leave(place)
         self._status[place] = loop.IDLE
-        self._prepared[place] = self.failures[place] = None
-        self._follow(place, None)
+        self._prepared.pop(place, None)
+        self.failures[place], self._events[place], self._actions[place] = None, math.inf, math.inf
         return float(self._wall_times[place])
 
     def _hold(self, until: np.ndarray, signals: np.ndarray) -> None:
+        """Sets the signals (N, m) of the robots that have not reached their time (s) in `until`;
+        see advance()."""
         places, period = self._places, self._first.constants.period
-        holds = self._before(until) & self._controlled
+        holds = self._before(until)
         changes = holds & (signals != places.signals).any(axis=1)
         self._log.change_ends[changes] = (self._times[changes] + period).round(MARK_DECIMALS)
         places.signals[holds], places.holds[holds] = signals[holds], 1
@@ -222,17 +340,22 @@ class LaneBatch(Batch):
         simulate(first)
         for other in started:
             other.result()
-        for place in np.flatnonzero(self._status > loop.DONE).tolist():
-            self.failures[place] = self.failures[place] or self._failure(place)
+        self._note_failures()
 
-    def ended(self, place: int) -> bool:
-        if self._status[place] == loop.DONE:
-            return bool(self._times[place] >= self._ends[place])
-        return bool(self._status[place] > loop.DONE)
+    @property
+    def ended(self) -> np.ndarray:
+        """True for each place (N,) whose robot has failed, or reached the end of its simulation.
+        False if it has only paused, or the place is idle."""
+        is_over = (self._status == loop.DONE) & (self._times >= self._ends)
+        return np.asarray(is_over | (self._status > loop.DONE))
 
-    def _result(self, place: int) -> SimulationResult:
+    def result(self, place: int) -> SimulationResult:
+        """Result of a robot that has ended, in a place. Raises its failure if it failed, and
+        InputError if its motion is unknown."""
+        if failure := self.failures[place]:
+            raise failure
+        self._check_history([place], key="result")
         prepared, state = self._prepared[place], self._places.states[place].copy()
-        assert prepared is not None
         return make_result(
             prepared.driven,
             self.motion(place),
@@ -247,16 +370,24 @@ class LaneBatch(Batch):
             record=prepared.record,
         )
 
+    def _check_history(self, places: Sequence[int], *, key: str) -> None:
+        for place in places:
+            if not self._log.kept[place]:
+                problem = f"robot {place} was restored without its motion: save(history=True)"
+                raise InputError("Simulation", key, problem)
+
     def motion(self, place: int) -> Motion:
-        """Recorded motion of the robot in place number `place` of the batch, up to its present
-        time."""
-        log, kept = self._log, slice(self._log.kept[place])
-        tables = log.times, log.states, log.signals, log.modes, log.drives
-        return Motion(*(table[place, kept].copy() for table in tables))
+        """Recorded motion of the robot in a place, up to its present time."""
+        kept = self._log.kept[place]
+        return Motion(**{name: getattr(self._log, name)[place, :kept].copy() for name in _HISTORY})
+
+    def _note_failures(self) -> None:
+        """Puts new failures into `failures`."""
+        for place in np.flatnonzero(self._status > loop.DONE).tolist():
+            self.failures[place] = self.failures[place] or self._failure(place)
 
     def _failure(self, place: int) -> SimulationFailure:
         prepared, time = self._prepared[place], float(self._times[place])
-        assert prepared is not None
         failure: SimulationFailure
         if self._status[place] == loop.TOO_MANY_EVALUATIONS:
             budget = prepared.driven.robot.scenario.simulation.max_evaluations
@@ -356,13 +487,17 @@ class CompiledEngine(Engine):
 
     lanes = processor_lanes()
 
-    def prepare(self, scenario: Scenario) -> None:
-        self.start([driven_robot(scenario, seeded_gait(scenario))])
+    def simulate(
+        self, robot: DrivenRobot, *, record: bool = False, viewer: Viewer | None = None
+    ) -> SimulationResult:
+        batch = LaneBatch(robot, record=record)
+        batch.advance()
+        return batch.result(0)
 
-    def start(
-        self, robots: Sequence[DrivenRobot], *, viewer: Viewer | None = None, **options: Any
-    ) -> LaneBatch:
-        return LaneBatch(robots, **options)
+
+def _begin(phases: Sequence[Phase]) -> float:
+    """Time (s) at which the first of some phases begins; infinite if there is none."""
+    return phases[0].begins if phases else math.inf
 
 
 ENGINE = CompiledEngine()

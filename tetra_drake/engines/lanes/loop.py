@@ -82,8 +82,6 @@ class Constants(NamedTuple):
     """Side of each input (2n,) of n oscillators: 1 left, -1 right, 0 neither."""
     tonic_input: Table
     """Tonic input without steering."""
-    gains: Table
-    """Feedback gains, in the order of feedback.PATHWAYS."""
     gain: Table
     """Force (N) per unit of an oscillator's output."""
     period: Table
@@ -207,9 +205,8 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     accepted = is_running & (error <= constants.tolerance[0])
     if live:
         feel(constants, lanes, log, step_end, lanes.step.end)
-        oscillator.correct_states(
-            constants.oscillators, lanes.inputs, step, accepted, lanes.oscillators
-        )
+        network, states = constants.oscillators, lanes.oscillators
+        oscillator.correct_states(network, lanes.inputs, step, accepted, states)
         drive(constants, lanes)
     if any_lane(accepted & (clock[DUE] <= step_end)):
         lanes.scratch[ACCEPTED] = select(accepted, 1.0, 0.0)
@@ -235,9 +232,8 @@ def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool
     clock = lanes.clock
     if live:
         feel(constants, lanes, log, clock[TIME], lanes.step.state)
-        oscillator.predict_states(
-            constants.oscillators, lanes.inputs, clock[STEP], lanes.oscillators
-        )
+        states = lanes.oscillators
+        oscillator.euler_step(constants.oscillators, lanes.inputs, clock[STEP], states)
         drive(constants, lanes)
         return
     run_ahead(constants, lanes, log, clock[END])
@@ -336,7 +332,8 @@ def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Ta
     `lanes.inputs`. They are for the robot's `state` (13*bodies,) at a time (s). A live network is
     integrated together with the robot."""
     steer(constants, lanes, log, time / constants.period[0])
-    sense(constants.senses, constants.gains, state, lanes.modes, lanes.forces, lanes.inputs)
+    gains = constants.oscillators.gains
+    sense(constants.senses, gains, state, lanes.modes, lanes.forces, lanes.inputs)
     for i in range(lanes.inputs.size):
         lanes.inputs[i] += lanes.tonic[i]
 

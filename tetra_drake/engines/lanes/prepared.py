@@ -49,6 +49,7 @@ class Prepared:
         robot, model, structure = driven.robot, driven.robot.model, driven.robot.structure
         scenario, turns, solver = robot.scenario, driven.turns, Solver.of(model)
         cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
+        oscillators = driven.oscillators
         longest = engine.longest_step(robot.longest_step)
         is_jointed = model.joints.node_a.size > 0
         tolerance = engine.tolerance_under(scenario.friction, is_jointed=is_jointed)
@@ -57,7 +58,7 @@ class Prepared:
         rows = max(2.0 * longest / cpg.listing_step + 32.0, len(driven.samples))
         sizes = sizes_of(model) | {
             "signals": structure.signals,
-            "states": len(driven.starting_state),
+            "states": oscillators.start.size,
             "blocks": len(solver.schedule.later),
             "marks": len(driven.marks) + 1,
             "times": len(times) + 1,
@@ -73,11 +74,10 @@ class Prepared:
         constants = Constants(
             robot=solver.oriented(model)._replace(ground=ground),
             solver=solver,
-            oscillators=driven.oscillators,
+            oscillators=oscillators,
             senses=robot.senses,
             sides=np.repeat(structure.sides, 2).astype(float),
             tonic_input=np.array([cpg.tonic]),
-            gains=driven.gains,
             gain=np.array([cpg.gain]),
             period=np.array([cpg.listing_step]),
             samples=np.array([driven.sample_count], dtype=float),
@@ -98,7 +98,7 @@ class Prepared:
         start.modes[:] = robot.starting_modes
         start.signals[:] = robot.first_signals
         start.drives[:, DRIVE] = robot.starting_drives()
-        start.oscillators[:] = make_states(driven.starting_state)
+        start.oscillators[:] = make_states(oscillators)
         start.tonic[:] = robot.tonic_input(turns)[0]
         return cls(driven, record, times, turns, sizes, constants, kind, start)
 
@@ -115,7 +115,7 @@ class Prepared:
         )
         if not is_alike:
             return Prepared.of(driven, record=self.record)
-        turns, drives = driven.turns, self.start.drives
+        oscillators, turns, drives = driven.oscillators, driven.turns, self.start.drives
         if robot is not own:
             drives = drives.copy()
             drives[:, DRIVE] = robot.starting_drives()
@@ -124,11 +124,11 @@ class Prepared:
             driven=driven,
             turns=turns,
             sizes=self.sizes | {"turns": len(turns)},
-            constants=self.constants._replace(oscillators=driven.oscillators, gains=driven.gains),
+            constants=self.constants._replace(oscillators=oscillators),
             start=self.start._replace(
                 signals=robot.first_signals,
                 drives=drives,
-                oscillators=make_states(driven.starting_state),
+                oscillators=make_states(oscillators),
                 tonic=robot.tonic_input(turns)[0],
             ),
         )

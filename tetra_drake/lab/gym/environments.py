@@ -46,10 +46,11 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.engines.simulation import Simulation, checked_actions, is_list
+from tetra_drake.engines.simulation import Simulation, is_list
 from tetra_drake.engines.states import States
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.results.result import SimulationResult, poses_of
+from tetra_drake.robot.command import checked_actions
 from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario

@@ -14,12 +14,11 @@ from pydrake.systems.primitives import LinearSystem
 from scipy import linalg
 from scipy.spatial.transform import Rotation
 
-from tetra_drake.engines.batch import checked_numbers
-from tetra_drake.engines.simulation import Controller
-from tetra_drake.errors import InputError, check_type
+from tetra_drake.errors import InputError, check_type, checked_numbers
 from tetra_drake.lab.linearization.rates import rates_and_forces
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import MODE_COLUMNS
+from tetra_drake.robot.command import Controller
 from tetra_drake.robot.equilibrium import Unactuated, displace, force_at_rest, free_motions
 from tetra_drake.robot.readings import Readings, bodies_state
 from tetra_drake.robot.robot import Robot
@@ -245,11 +244,7 @@ def _checked(
     given: npt.ArrayLike, shape: tuple[int, ...], *, source: str = "linearize", key: str
 ) -> np.ndarray:
     """An argument as finite numbers of a shape. Raises InputError for anything else."""
-    numbers = checked_numbers(given, shape, source=source, key=key)
-    if not np.isfinite(numbers).all():
-        found = numbers[~np.isfinite(numbers)].flat[0]
-        raise InputError(source, key, f"found {found}, expected finite numbers")
-    return numbers
+    return checked_numbers(given, shape, source=source, key=key, finite=True)
 
 
 def _checked_cost(given: npt.ArrayLike, size: int, key: str) -> np.ndarray:
