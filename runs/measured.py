@@ -205,7 +205,7 @@ KNOWN = ("simplex_loads", "simplex_frequencies", "spine", "jumps")
 def of_simulations(
     under_load: pandas.DataFrame, poses: pandas.DataFrame, jumps: Mapping[float, Sequence[Any]]
 ) -> dict[str, Any]:
-    """Numbers of the page that need simulations, beside those of the three figures."""
+    """Numbers of the page, beside what its figures show, that need simulations."""
     steps = [int(np.abs(under_load["load"] - load).argmin()) for load in (0.0, 0.3, 0.6, 1.0, 2.1)]
     apart: dict[str, Any] = {}
     for label, column, size in (
