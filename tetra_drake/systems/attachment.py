@@ -190,7 +190,7 @@ def BodyForces_(T: type) -> type:
     return Impl
 
 
-def checked_numbers(
+def numbers_for_each(
     source: str, key: str, given: npt.ArrayLike, *, count: int, least: float = -math.inf
 ) -> np.ndarray:
     """Array (count,) from an argument that is one number for all entries, or has a number for each.

@@ -34,7 +34,7 @@ from tetra_drake.systems.attachment import (
     check_host,
     check_parameters,
     check_part,
-    checked_numbers,
+    numbers_for_each,
 )
 from tetra_drake.systems.cable_geometry import CableGeometry_, RegisterCylinders
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
@@ -135,7 +135,7 @@ class CableNetwork(ConvertibleSystem):
         check_parameters("SetLaw", self, context)
         check_type("SetLaw", "law", law, cable.CableLaw)
         given, count = law._asdict().items(), len(self._names)
-        rows = [checked_numbers("SetLaw", key, row, count=count, least=0.0) for key, row in given]
+        rows = [numbers_for_each("SetLaw", key, row, count=count, least=0.0) for key, row in given]
         context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(rows))
 
     def _table(
@@ -262,7 +262,7 @@ def AddCables(
     starts = default if drives is None else drives
     if np.size(starts) and not len(default):
         raise InputError("AddCables", "drives", f"found {drives!r:.60}, expected none")
-    starts = checked_numbers("AddCables", "drives", starts, count=len(default))
+    starts = numbers_for_each("AddCables", "drives", starts, count=len(default))
     names = [one.name for one in cables]
     if scene_graph is not None:
         check_part("AddCables", "scene_graph", builder, scene_graph, SceneGraph)

@@ -36,7 +36,7 @@ from tetra_drake.systems.attachment import (
     check_frame,
     check_host,
     check_parameters,
-    checked_numbers,
+    numbers_for_each,
 )
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
@@ -151,7 +151,7 @@ class GroundContact(ConvertibleSystem):
         if theirs != ours:
             raise InputError("SetGround", "ground", "found another terrain")
         rows = [
-            checked_numbers("SetGround", "ground", given, count=own.size, least=0.0)
+            numbers_for_each("SetGround", "ground", given, count=own.size, least=0.0)
             for given, own in (
                 (ground.normal, self._ground.normal),
                 (ground.friction.constants, self._ground.friction.constants),
@@ -264,7 +264,7 @@ def AddGroundContact(
             raise InputError("AddGroundContact", key, f"frame '{frame.name()}' is given twice")
     nodes = Nodes.of(plant, frames)
     contacts = np.array([nodes.of_frame[frame.index()] for frame in frames], dtype=np.int64)
-    radii = checked_numbers("AddGroundContact", "radius", radius, count=len(frames), least=0.0)
+    radii = numbers_for_each("AddGroundContact", "radius", radius, count=len(frames), least=0.0)
     carriers = nodes.carriers[contacts]
     placed = ground.under(contacts, carriers=carriers, radius=radii, nodes=len(nodes.p_BN))
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, ground=placed)
@@ -273,7 +273,7 @@ def AddGroundContact(
         if np.shape(modes) != shape:
             problem = f"found shape {np.shape(modes)}, expected {shape}"
             raise InputError("AddGroundContact", "modes", problem)
-        numbers = checked_numbers(
+        numbers = numbers_for_each(
             "AddGroundContact", "modes", np.ravel(modes), count=math.prod(shape)
         )
         modes = numbers.reshape(shape)
