@@ -91,7 +91,9 @@ def with_unbroken_numbers(text: str) -> str:
         elif any(numbers):
             cells = zip(line.split("|"), numbers, strict=True)
             lines[place] = "|".join(
-                f" {cell.strip(' ').translate(_UNBROKEN)} " if is_number else cell
+                f" {cell.strip(' ').translate(_UNBROKEN)} "
+                if is_number and "<" not in cell
+                else cell
                 for cell, is_number in cells
             )
     return "\n".join(lines)

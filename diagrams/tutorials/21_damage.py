@@ -1,6 +1,7 @@
 """Damage: a robot walks, and loses a cable on the way."""
 
 # %% Robots side by side that all play the recorded walk of the robot with motors.
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,10 @@ from matplotlib.figure import Figure
 
 import tetra_drake as td
 
-scenario = td.load_scenario("runs/motors/lab/scenario.yaml")
-command = td.load_command("runs/motors/lab/command.csv", scenario)
+scenario = td.load_scenario("runs/motors/scenario.yaml")
+with tempfile.TemporaryDirectory() as folder:
+    td.export(scenario, "runs/motors", rate=50.0, out=Path(folder) / "lab")
+    command = td.load_command(Path(folder) / "lab" / "command.csv", scenario)
 cables = scenario.whole_cables
 robots = td.Simulation(scenario, count=len(cables) + 1, control_period=command.period)
 to_centre = robots.robot.structure.node_shares

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from helpers import joined
-from helpers.anchored import BAR, HUNG, LINE, SWINGING, scenario_of, supported_prism
+from helpers.anchored import BAR, HUNG, SWINGING, scenario_of, supported_prism
 from helpers.bars import ACROSS, CROSSED, RADIUS, STIFFNESS, loose_bars
 from helpers.converged import CONVERGED, shortly
 from helpers.hanging import HANGING, MASS
@@ -322,20 +322,6 @@ def test_the_spin_of_a_bar_about_its_axis_hardly_shortens_steps():
     poses, others = poses_of(motion.states), poses_of(spun.states)
     np.testing.assert_allclose(others[..., 4:], poses[..., 4:], atol=5e-4)
     assert np.ptp(poses[..., 4:], axis=0).max() > 5e-3, "it moves"
-
-
-@pytest.mark.parametrize("engine", ACCURATE)
-def test_a_node_with_a_damper_sinks_as_in_oil(engine):
-    mass, damping = 0.2, 0.8
-    tree = {"nodes": {"top": [0.0, 0.0, 1.0], "a": [0.0, 0.0, 0.5]}, "anchors": {"top": "xyz"}}
-    tree |= {"masses": {"a": mass}, "dampers": {"a": damping}, "cables": {"line": LINE}}
-    raised = scenario_of(tree, 0.2, **{"robot.offsets": [["0 m", "0 m", "0.3 m"]]})
-    trajectory = trajectory_of(Robot.of(raised), engine)
-    z = trajectory["p_WN"].sel(node="a", axis="z")
-    t, lag = trajectory["time"].values, mass / damping
-    sunk = mass * G / damping * (t - lag * (1.0 - np.exp(-t / lag)))
-    np.testing.assert_allclose(z[0] - z, sunk, atol=1e-4)
-    assert sunk[-1] > 0.1, "it sinks"
 
 
 def test_a_stiff_anchor_takes_no_shorter_steps():

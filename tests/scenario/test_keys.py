@@ -65,4 +65,5 @@ def test_what_kinds_of_a_section_have_in_common_is_told_once():
     own = motor.split("\n## ")[0]
     assert "- `actuation.max_force` and `actuation.max_speed`: as for `!Winch`" in own
     assert "- `actuation.time_constant` (s, > 0): " in own  # with another text
-    assert "`cpg.start_up` (default 1.25 s)" in keys_page().split("`cpg`: `!Phase`\n")[1]
+    phase = keys_page().split("`cpg`: `!Phase`\n")[1].split("\n## ")[0]
+    assert "`cpg.start_up`" in phase and phase.rstrip().endswith("as for `!Matsuoka`")

@@ -13,7 +13,7 @@ from tetra_drake.scenario.world import World
 Body = tuple[tuple[str, float | str], ...]
 """Numbers of a robot: scenario keys, and values as texts with units, or as numbers without one."""
 
-_MOST = 40
+_MOST = 15
 """Largest number of parameters that are printed."""
 
 
