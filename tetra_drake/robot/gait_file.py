@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -23,7 +24,8 @@ def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
     write_whole(path, json.dumps(gait.to_json(scenario), indent=1) + "\n")
 
 
-_OLDER = {"weights": "weight ", "gains": "gain ", "tau_a_s": "tau_A", "tau_b_s": "tau_B"}
+_WEIGHT = "weight "
+_OLDER = {"weights": _WEIGHT, "gains": "gain ", "tau_a_s": "tau_A", "tau_b_s": "tau_B"}
 """Names of parameters, or their beginnings, by keys that gait files had up to version 0.5.0."""
 
 
@@ -40,13 +42,20 @@ class GaitFile(Section):
     """Numbers of the body by scenario key, quantities as texts with units."""
 
 
-def _renewed(tree: Any) -> Any:
-    """Content of a gait file of version 0.5.0 in the present form; any other content as it is."""
+def _renewed(tree: Any, names: Iterable[str]) -> Any:
+    """Content of a gait file of version 0.5.0 in the present form; any other content as it is.
+    `names` are the parameters of the scenario, in whose order weights may be a list."""
     if not isinstance(tree, dict) or "weights" not in tree:
         return tree
+    weights = [name.removeprefix(_WEIGHT) for name in names if name.startswith(_WEIGHT)]
     parameters: dict[str, Any] = {}
     for key in _OLDER.keys() & tree.keys():
-        group = tree[key] if isinstance(tree[key], dict) else {"": tree[key]}
+        group = tree[key]
+        if key == "weights" and isinstance(group, list):  # a place without a name is refused later
+            places = map(str, range(len(weights), len(group)))
+            group = dict(zip([*weights, *places], group, strict=False))
+        elif not isinstance(group, dict):
+            group = {"": group}
         parameters |= {f"{_OLDER[key]}{name}": value for name, value in group.items()}
     return {key: x for key, x in tree.items() if key not in _OLDER} | {"parameters": parameters}
 
@@ -67,7 +76,8 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
     """
     raw = read_json(given_path(path, "load_gait", "path"), "gait file")
     raw = raw.get(key) if key and isinstance(raw, dict) else raw
-    scenario, file = given_scenario(scenario), GaitFile.from_tree(_renewed(raw), path, key=key)
+    scenario = given_scenario(scenario)
+    file = GaitFile.from_tree(_renewed(raw, scenario.parameters), path, key=key)
     place = f"{key}.parameters".strip(".")
     gait = Gait(
         name=file.name or Path(path).stem,
