@@ -57,11 +57,9 @@ def names_scenario(name_or_file: str | Path) -> bool:
     name = str(name_or_file)
     if name in structure_names() or not os.path.isfile(name):
         return name in shipped_scenarios() and name not in structure_names()
-    if foreign_format(Path(name)):
+    if Path(name).suffix.lower() in _XML:
         return False
-    keys = [*keys_of(StructureFile), *SCENARIO_KEYS]
-    content = read_mapping(Path(name), "structure file", keys=keys)
-    return not SCENARIO_KEYS.isdisjoint(content)
+    return not SCENARIO_KEYS.isdisjoint(_read(Path(name)))
 
 
 def foreign_format(name_or_file: str | Path) -> str:
@@ -72,8 +70,14 @@ def foreign_format(name_or_file: str | Path) -> str:
         return "MuJoCo"
     if str(file) in {*structure_names(), *shipped_scenarios()} or not os.path.isfile(file):
         return ""
+    return "" if KEYS_OF_NTRT.isdisjoint(_read(file)) else "NTRT"
+
+
+def _read(file: Path) -> Tree:
+    """Content of a YAML file that holds a structure, a scenario or a structure of NTRT. Raises
+    InputError for any other content."""
     keys = [*keys_of(StructureFile), *SCENARIO_KEYS, *KEYS_OF_NTRT]
-    return "NTRT" if KEYS_OF_NTRT & read_mapping(file, "structure file", keys=keys).keys() else ""
+    return read_mapping(file, "structure file", keys=keys)
 
 
 def structure_file(name: str, folder: Path) -> Path:
@@ -117,10 +121,18 @@ def structure_of(content: Any, file: Path) -> StructureFile:
     return structure
 
 
-def _content(file: Path) -> Any:
+def _content(file: Path) -> Tree:
     """Content of a structure file. Raises InputError for a file of other software."""
-    if software := foreign_format(file):
-        unit = " --unit dm" if software == "NTRT" else ""
-        remedy = f"tetra-drake structure '{file}'{unit} --out structure.yaml"
-        raise InputError(file, "", f"is a file of {software}; convert it once: {remedy}")
-    return read_mapping(file, "structure file", keys=keys_of(StructureFile))
+    if file.suffix.lower() in _XML:
+        raise _foreign(file, "MuJoCo")
+    keys = [*keys_of(StructureFile), *KEYS_OF_NTRT]
+    content = read_mapping(file, "structure file", keys=keys)
+    if not KEYS_OF_NTRT.isdisjoint(content):
+        raise _foreign(file, "NTRT", unit=" --unit dm")
+    return content
+
+
+def _foreign(file: Path, software: str, *, unit: str = "") -> InputError:
+    """Error about a file of other software, with the command that converts it."""
+    remedy = f"tetra-drake structure '{file}'{unit} --out structure.yaml"
+    return InputError(file, "", f"is a file of {software}; convert it once: {remedy}")

@@ -19,6 +19,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.matsuoka import Matsuoka
+from tetra_drake.laws.oscillator import Oscillators
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
@@ -339,11 +340,7 @@ def _AddSignals(
         return passed.get_output_port()
     if cpg.signals == "live":
         robot.turns(gait, steering)  # raises InputError for a wrong turn
-        network = robot.oscillators(gait)
-        tonic, start = np.full(2 * size, cpg.tonic), network.start
-        made = OscillatorCpg(network, tonic=tonic, gain=cpg.gain)
-        if network.own is Matsuoka.own:
-            made = MatsuokaCpg(network.constants, tonic=tonic, initial_state=start, gain=cpg.gain)
+        made = _MakeCpg(robot.oscillators(gait), tonic=np.full(2 * size, cpg.tonic), gain=cpg.gain)
         oscillators = builder.AddNamedSystem("cpg", made)
         if robot.structure.sides.any():
             turn = gait.turn if steering is None else steering
@@ -358,3 +355,10 @@ def _AddSignals(
     start_up = builder.AddNamedSystem("start_up", StartUpGate(size, start_up=cpg.start_up))
     builder.Connect(oscillators.get_output_port(0), start_up.get_input_port())
     return start_up.get_output_port()
+
+
+def _MakeCpg(network: Oscillators, *, tonic: np.ndarray, gain: float) -> OscillatorCpg:
+    """LeafSystem of oscillators of any kind. Matsuoka's have a port of their neurons, too."""
+    if network.own is not Matsuoka.own:
+        return OscillatorCpg(network, tonic=tonic, gain=gain)
+    return MatsuokaCpg(network.constants, tonic=tonic, initial_state=network.start, gain=gain)
