@@ -52,22 +52,11 @@ names and their modules are in `__init__.pyi`, which type checkers read, too.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from tetra_drake.on_demand import loaded, places
+from tetra_drake.on_demand import attributes
 
 __version__ = "0.5.0"
 
-_PLACES = places(Path(__file__))
+_NAMES, __getattr__, __dir__ = attributes(__name__, Path(__file__))
 
-__all__ = ["__version__", *_PLACES]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
-        raise AttributeError(f"module 'tetra_drake' has no attribute '{name}'")
-    return loaded(_PLACES[name])
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__all__ = ["__version__", *_NAMES]

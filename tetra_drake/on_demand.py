@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+_IMPORT = r"from (\S+) import (\w+)"
 
 
 def loaded(place: str) -> Any:
@@ -15,8 +18,21 @@ def loaded(place: str) -> Any:
     return getattr(importlib.import_module(module), name)
 
 
-def places(package: Path) -> Mapping[str, str]:
-    """Places of the public names of a package, by name: the imports in the stub (.pyi) beside its
-    file `package`."""
-    stub = package.with_suffix(".pyi").read_text(encoding="utf-8")
-    return {name: f"{place}:{name}" for place, name in re.findall(r"from (\S+) import (\w+)", stub)}
+def attributes(
+    package: str, file: Path
+) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+    """Public names of a package, its `__getattr__` and its `__dir__`: each name is imported at its
+    first use. The names and their modules are the imports in the stub (.pyi) beside the package's
+    `file`."""
+    stub = file.with_suffix(".pyi").read_text(encoding="utf-8")
+    places = {name: f"{module}:{name}" for module, name in re.findall(_IMPORT, stub)}
+
+    def get(name: str) -> Any:
+        if name not in places:
+            raise AttributeError(f"module '{package}' has no attribute '{name}'")
+        return loaded(places[name])
+
+    def names() -> list[str]:
+        return sorted({*vars(sys.modules[package]), *places})
+
+    return [*places], get, names

@@ -1,10 +1,10 @@
 """LeafSystems of the diagram: ports, state and events. The laws are in `laws`.
 
 All names here are public. In the order of the signal flow: Steering, MatsuokaCpg (OscillatorCpg for
-other kinds of oscillators), StartUpGate,
-CableNetwork, GroundContact and StateForces around a MultibodyPlant, and Feedback back to the
-network; HeldSignals or SampledController in place of a network. AddCables, AddGroundContact and
-Attach add them to any plant; diagram.MakeTensegrityDiagram() wires a robot.
+other kinds of oscillators), StartUpGate, CableNetwork, GroundContact and StateForces around a
+MultibodyPlant, and Feedback back to the network; HeldSignals or SampledController in place of a
+network. AddCables, AddGroundContact and Attach add them to any plant;
+diagram.MakeTensegrityDiagram() wires a robot.
 
 Diagrams of these systems convert to AutoDiffXd and can be cloned; see `scalar_conversion`.
 
@@ -14,20 +14,7 @@ Each name is imported at its first use; the names and their modules are in `__in
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from tetra_drake.on_demand import loaded, places
+from tetra_drake.on_demand import attributes
 
-_PLACES = places(Path(__file__))
-
-__all__ = [*_PLACES]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
-        raise AttributeError(f"module 'tetra_drake.systems' has no attribute '{name}'")
-    return loaded(_PLACES[name])
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__all__, __getattr__, __dir__ = attributes(__name__, Path(__file__))
