@@ -147,6 +147,63 @@ class Fit:
         )
 
 
+def fit(
+    scenario: GivenScenario,
+    measurements: Sequence[Measurement],
+    parameters: Mapping[str, Bounds],
+    *,
+    search: bool = False,
+    out: str | Path | None = None,
+    say: Say = silent,
+    source: object = "fit",
+) -> Fit:
+    """Fits values of a scenario to measurements of a robot, by bounded least squares.
+
+        >>> scenario = td.load_scenario("prism")
+        >>> heights = td.Rest(positions={"n3 z": "0.172 m", "n4 z": "0.172 m"})
+        >>> bounds = {"robot.cables.side.stiffness": ("50 N/m", "200 N/m")}
+        >>> fit = td.fit(scenario, [heights], bounds)
+        >>> stiffer = fit.scenario
+
+    Residuals are weighted by the uncertainties of the measurements. Their derivatives by the
+    parameters are finite differences of scenarios that are simulated side by side. The 95 %
+    intervals of the values follow from the derivatives.
+
+    Args:
+        scenario: a scenario, its name or file, or a run. Its values are the start.
+        measurements: values of the kinds td.MotionCapture and td.Rest.
+        parameters: the bounds, least and most, by scenario key. Texts have units; numbers are SI.
+            Keys joined by commas get the same value.
+        search: before least squares, searches all values within the bounds for a better start, by
+            CMA-ES; for data that several minima may fit.
+        out: a folder for the fitted scenario, tables, figure and page. It also keeps each
+            evaluation, so that an interrupted fit goes on where it was.
+        say: function that gets a line of text after each iteration.
+        source: file with the parameters, for errors.
+
+    Raises:
+        InputError: names what cannot be used.
+    """
+    check_type("fit", "say", say, Callable)
+    folder = None if out is None else given_path(out, "fit", "out")
+    if folder is not None:
+        check_folder(folder)
+        if (folder / SCENARIO).exists() and not (folder / KEPT_EVALUATIONS).exists():
+            raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
+    found = fit_values(
+        given_scenario(scenario),
+        measurements,
+        parameters,
+        search=search,
+        folder=folder,
+        say=say,
+        source=source,
+    )
+    if folder is not None:
+        save_fit(found, folder)
+    return found
+
+
 def fit_values(
     scenario: Scenario,
     measurements: Sequence[Measurement],
@@ -157,22 +214,9 @@ def fit_values(
     say: Say = silent,
     source: object = "fit",
 ) -> Fit:
-    """Fits values of a scenario to measurements, within bounds, by weighted least squares.
-
-    Args:
-        scenario: the scenario whose values are the start.
-        measurements: the measurements, of the kinds MotionCapture and Rest.
-        parameters: the bounds, least and most, by scenario key of the value to fit: texts with
-            units, or numbers in SI. Keys joined by commas get the same value.
-        search: True to search all values within the bounds for a better start, by CMA-ES.
-        folder: folder for the predictions of each simulated point. Another fit to the same data
-            reads them in place of a simulation.
-        say: function that gets a line of text after each iteration.
-        source: file with the parameters, to name in errors.
-
-    Raises:
-        InputError: if an argument cannot be used, or the start cannot be simulated.
-    """
+    """Fit of fit(), without its files. Another fit to the same data reads the predictions of each
+    simulated point in the `folder` in place of a simulation. Raises InputError if an argument
+    cannot be used, or the start cannot be simulated."""
     from scipy.optimize import least_squares
 
     began = time.perf_counter()
@@ -409,60 +453,3 @@ def residuals(fit: Fit) -> Drawn:
             panel.set_xticks(named["along"], named["label"], rotation=30, ha="right")
     legend_below(page, styles)
     return titled(page, "Predictions minus measurements")
-
-
-def fit(
-    scenario: GivenScenario,
-    measurements: Sequence[Measurement],
-    parameters: Mapping[str, Bounds],
-    *,
-    search: bool = False,
-    out: str | Path | None = None,
-    say: Say = silent,
-    source: object = "fit",
-) -> Fit:
-    """Fits values of a scenario to measurements of a robot, by bounded least squares.
-
-        >>> scenario = td.load_scenario("prism")
-        >>> heights = td.Rest(positions={"n3 z": "0.172 m", "n4 z": "0.172 m"})
-        >>> bounds = {"robot.cables.side.stiffness": ("50 N/m", "200 N/m")}
-        >>> fit = td.fit(scenario, [heights], bounds)
-        >>> stiffer = fit.scenario
-
-    Residuals are weighted by the uncertainties of the measurements. Their derivatives by the
-    parameters are finite differences of scenarios that are simulated side by side. The 95 %
-    intervals of the values follow from the derivatives.
-
-    Args:
-        scenario: a scenario, its name or file, or a run. Its values are the start.
-        measurements: values of the kinds td.MotionCapture and td.Rest.
-        parameters: the bounds, least and most, by scenario key. Texts have units; numbers are SI.
-            Keys joined by commas get the same value.
-        search: before least squares, searches all values within the bounds for a better start, by
-            CMA-ES; for data that several minima may fit.
-        out: a folder for the fitted scenario, tables, figure and page. It also keeps each
-            evaluation, so that an interrupted fit goes on where it was.
-        say: function that gets a line of text after each iteration.
-        source: file with the parameters, for errors.
-
-    Raises:
-        InputError: names what cannot be used.
-    """
-    check_type("fit", "say", say, Callable)
-    folder = None if out is None else given_path(out, "fit", "out")
-    if folder is not None:
-        check_folder(folder)
-        if (folder / SCENARIO).exists() and not (folder / KEPT_EVALUATIONS).exists():
-            raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
-    found = fit_values(
-        given_scenario(scenario),
-        measurements,
-        parameters,
-        search=search,
-        folder=folder,
-        say=say,
-        source=source,
-    )
-    if folder is not None:
-        save_fit(found, folder)
-    return found
