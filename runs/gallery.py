@@ -14,11 +14,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from page import rendered
-from record import EXPERIMENTS, PICTURE
+from record import EXPERIMENTS, PICTURE, best_walk
 from tables import HERE, best_of_all, load_all
 
-from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.run import load_run
 from tetra_drake.files import write_whole
 from tetra_drake.report.result_folder import REPLAY
 
@@ -38,9 +36,7 @@ def save_replays(folder: Path, names: Sequence[str]) -> None:
     """Simulates the best gaits of runs on the compiled engine and writes their replays into the
     folder, each in a folder of the run's name."""
     for name in names:
-        run = load_run(HERE / name)
-        result = simulate(run.scenario.on_engine("compiled"), run.best_gait(), record=True)
-        result.save_replay(folder / name / REPLAY, viewer=folder / VIEWER)
+        best_walk(HERE / name).save_replay(folder / name / REPLAY, viewer=folder / VIEWER)
 
 
 def save_gallery(folder: Path, names: Sequence[str]) -> None:

@@ -43,6 +43,7 @@ from tetra_drake.formatting import duration, listed
 from tetra_drake.lab.elites.elites import judge_elites
 from tetra_drake.machine import available_cores
 from tetra_drake.report.result_folder import REPLAY
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import parse_yaml
@@ -151,8 +152,8 @@ def publish(
 
 
 def make_folder(made: Path, shown: Path, *, initial: bool = False, whole: bool = False) -> None:
-    """Thins a run into the folder `shown`, in place of its old trials; or copies
-    its record, if it is to be `whole`."""
+    """Thins a run into the folder `shown`, in place of its old trials; or copies its record, if it
+    is to be `whole`."""
     for old in shown.glob("trial_*"):
         shutil.rmtree(old)
     thin(made, shown, initial=initial, whole=whole)
@@ -187,11 +188,16 @@ def timed(name: str, stage: str, out: Path) -> Iterator[None]:
         print(f"{name}, {stage}: {duration(spent['wall_s'])}", flush=True)
 
 
-def show(directory: Path, *, film: bool) -> None:
-    """Simulates a run's best gait on the compiled engine. Writes the picture, the gait diagram and,
-    if the experiment is filmed, the film."""
+def best_walk(directory: Path) -> SimulationResult:
+    """A run's best gait, simulated on the compiled engine, with the trajectory."""
     run = load_run(directory)
-    result = simulate(run.scenario.on_engine("compiled"), run.best_gait(), record=True)
+    return simulate(run.scenario.on_engine("compiled"), run.best_gait(), record=True)
+
+
+def show(directory: Path, *, film: bool) -> None:
+    """Writes the picture of a run's best gait, the gait diagram and, if the experiment is filmed,
+    the film."""
+    result = best_walk(directory)
     films = [directory / FILM] if film else []
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / REPLAY
