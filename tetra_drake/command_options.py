@@ -20,6 +20,7 @@ say = partial(print, flush=True)
 
 
 def warn(text: str) -> None:
+    """Prints a warning of a command, apart from its results."""
     print(f"tetra-drake: {text}", file=sys.stderr, flush=True)
 
 

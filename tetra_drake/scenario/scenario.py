@@ -37,10 +37,7 @@ from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import by_name
 from tetra_drake.settings.refusals import TAG, described, hint, refuse
 from tetra_drake.settings.section import value_at, written
-from tetra_drake.settings.units import (
-    plainest,
-    shortest,
-)
+from tetra_drake.settings.units import plainest, shortest
 
 _WIDTH, _ROWS = 100, 20
 """Largest number of characters in a line of a printed scenario, and of rows in a notebook."""
