@@ -40,7 +40,7 @@ from tetra_drake.figures.style import LINE_COLOURS, common_style, line_style, sa
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed
 from tetra_drake.lab.predict.predict import interval_text
-from tetra_drake.study.statistics import json_rows
+from tetra_drake.lab.study.statistics import json_rows
 
 NUMBERS = "numbers.json"
 """File of the numbers that need simulations."""

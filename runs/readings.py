@@ -27,11 +27,11 @@ from tetra_drake.experiment import evolve
 from tetra_drake.files import check_file, read_json, read_text, write_whole
 from tetra_drake.formatting import listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.lab.study.statistics import interval, interval_of_resamples, resampled
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
 from tetra_drake.scenario.yaml_text import parse_yaml
-from tetra_drake.study.statistics import interval, interval_of_resamples, resampled
 
 HERE = Path(__file__).parent
 RECORD = HERE / "thesis" / "readings.json"
