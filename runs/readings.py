@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -163,13 +163,11 @@ def results(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> dict[s
     }
 
 
-def factor(
-    trials: pandas.DataFrame, keys: Iterable[str] = THESIS, drawn: np.ndarray | None = None
-) -> np.ndarray:
+def factor(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> np.ndarray:
     """Factor (...) by which our results differ from THESIS: the exponential of the root mean square
     of the logarithms of their ratios. `drawn` is as for results()."""
     ours = results(trials, drawn)
-    ratios = [np.maximum(ours[key], 1e-3) / THESIS[key] for key in keys]
+    ratios = [np.maximum(ours[key], 1e-3) / THESIS[key] for key in THESIS]
     return np.asarray(np.exp(np.sqrt(np.mean(np.square(np.log(ratios)), axis=0))))
 
 
