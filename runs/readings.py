@@ -27,7 +27,7 @@ from tetra_drake.experiment import evolve
 from tetra_drake.files import check_file, read_json, read_text, write_whole
 from tetra_drake.formatting import listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
-from tetra_drake.lab.study.statistics import interval, interval_of_resamples, resampled
+from tetra_drake.lab.study.statistics import interval_of_resamples, resampled
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
@@ -196,11 +196,6 @@ def tables_of(record: Record) -> dict[str, pandas.DataFrame]:
 def off_by(trials: pandas.DataFrame) -> str:
     """Text of the factor by which our results differ from THESIS, with its interval."""
     return ranged(float(factor(trials)), *factor_interval(trials))
-
-
-def mean_of(values: pandas.Series) -> str:
-    """Text of a mean over the trials with its 95 % interval."""
-    return ranged(values.mean(), *interval(values))
 
 
 def main(names: Sequence[str]) -> None:
