@@ -347,8 +347,8 @@ class Winch(LimitedActuator):
     command_unit = 1e-3
 
     time_constant: Time = Field(default=0.02, gt=0)
-    """Time constant of the lag with which the free length follows its command; by default typical
-    of small geared motors (8 Hz)."""
+    """Time constant of the free length behind its command; by default typical of small geared
+    motors (8 Hz)."""
     least_length: Length = Field(default=0.0, ge=0)
     """Least free length to which the winch winds a cable."""
 

@@ -98,8 +98,8 @@ class PhaseOscillators(CpgKind):
     coupling: Annotated[list[Annotated[InverseTime, Field(ge=0)]], *PAIR] = Field(
         default=[8.0, 8.0]
     )
-    """Bounds of the coupling w of neighbours. A phase that is displaced by a little comes back at a
-    rate of about w."""
+    """Bounds of the coupling w of neighbours. A small displacement of a phase decays at a rate of
+    about w."""
     common: list[Literal["amplitude", "lag"]] = Field(default=[])
     """Parameters that random and evolved gaits have in common for all oscillators."""
     settling: InverseTime = Field(default=20.0, gt=0)

@@ -456,7 +456,7 @@ class Steps(Relief):
     count: int = Field(ge=1)
     """Number of steps."""
     start: Length | None = None
-    """Coordinate x of the first step; 1 in ahead of the robot if not given."""
+    """Coordinate x of the first step; by default 1 in ahead of the robot."""
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         start = ahead if self.start is None else self.start

@@ -35,22 +35,22 @@ class Drake(EngineSettings):
 
     module: ClassVar[str] = "tetra_drake.engines.drake"
     scheme: Literal["radau3", "runge_kutta3"] | None = None
-    """Integrator: implicit (radau3) or explicit (runge_kutta3). By default radau3 for up to 12
-    bodies; for n more it is runge_kutta3, unless dampers stop the fastest motion at a rate above 14
-    n² per second."""
+    """Implicit (radau3) or explicit (runge_kutta3) integrator. By default radau3 up to 12 bodies;
+    for n more runge_kutta3, unless dampers stop the fastest motion at a rate above 14 n² per
+    second."""
     accuracy: float | None = Field(default=None, gt=0)
     """Target accuracy per step. By default half the least damping ratio of a cable, anchor or joint
-    with the robot's mass, from 2e-5 to 0.005, or to 0.01 where friction is nearly viscous, as in
-    the scenario thesis: longer steps of radau3 would damp vibrations."""
+    with the robot's mass, from 2e-5 to 0.005, or to 0.01 where friction is nearly viscous: longer
+    steps of radau3 would damp vibrations."""
     max_step: Time | None = Field(default=None, gt=0)
-    """Longest step. By default 8 ms, or 12 ms where friction is nearly viscous; less if that
-    damping ratio is below 0.05."""
+    """Longest step. By default 8 ms, or 12 ms where friction is nearly viscous; less if that ratio
+    is below 0.05."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
     """When a node may change its mode: at the end of steps, or where a witness function is zero.
-    `witness` needs short steps, such as the steps of runge_kutta3."""
+    `witness` needs short steps."""
     look_ahead: Time | None = Field(default=None, ge=0)
-    """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none. If not
-    given, 20 us; 0.3 ms where friction is nearly viscous."""
+    """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none. By
+    default 20 us; 0.3 ms where friction is nearly viscous."""
 
 
 class Compiled(EngineSettings):
@@ -59,9 +59,9 @@ class Compiled(EngineSettings):
 
     module: ClassVar[str] = "tetra_drake.engines.lanes.batch"
     tolerance: Speed | None = Field(default=None, gt=0)
-    """Permitted error per step of the velocity of a body; for rotations, of its strut tips. If not
-    given, 0.1 mm/s; 5 mm/s where friction is nearly viscous, as in the scenario thesis; a tenth of
-    it for robots with joints."""
+    """Permitted error per step of the velocity of a body; for rotations, of its strut tips. By
+    default 0.1 mm/s; 5 mm/s where friction is nearly viscous, as in the scenario thesis; a tenth
+    for robots with joints."""
     max_step: Time | None = Field(default=None, gt=SHORTEST_STEP, le=1)
     """Longest step. If not given, 3 ms; less where damping is light, as for !Drake."""
 

@@ -67,9 +67,9 @@ class SensingPolicy(PolicyKind):
     """
 
     readings: list[Reading] = Field(default=["clock", "lengths", "normal_forces"], min_length=1)
-    """Readings that the policy gets; see the class Readings. `clock` is sine and cosine of a clock.
-    Lengths are changes since the start, as shares. Forces are in units of the robot's weight,
-    positions of nodes from the robot's centre in units of the first strut."""
+    """Readings that the policy gets (class Readings). `clock` is sine and cosine. Lengths are
+    changes since the start, as shares; forces in units of the weight; positions from the robot's
+    centre, in units of the first strut."""
     clock: Time = Field(default=1.0, gt=0)
     """Period of the clock."""
 
@@ -158,8 +158,7 @@ class PythonPolicy(PolicyKind):
     tag = "Python"
 
     function: str = Field(pattern=r"^[\w.]+:\w+$")
-    """Module and name of the function, such as my_module:my_policy. Modules in the working folder
-    are found."""
+    """Module and name of the function: my_module:my_policy, also from the working folder."""
     count: int = Field(ge=1, le=MOST_PARAMETERS)
     """Number of parameters."""
     bounds: Annotated[list[float], *PAIR] = Field(default=[-1.0, 1.0])

@@ -98,19 +98,18 @@ class StrutGroup(Section):
     diameter: Length = Field(gt=0)
     """Diameter of a strut."""
     density: Density = Field(ge=0)
-    """Density of struts and spheres. It may be 0 where other parts of the body have mass."""
+    """Density of struts and their spheres; 0 only where other parts of the body have mass."""
     node_diameter: Length = Field(ge=0)
-    """Diameter of the spheres; 0 for none. A node has one sphere, from its first strut in the
-    file."""
+    """Diameter of the spheres; 0 for none. A node's first strut in the file counts."""
     contact_radius: Length | None = Field(default=None, ge=0)
-    """Radius of the sphere about each end that touches the ground; by default the sphere's radius,
-    else the strut's; 0 for nodes that anchors hold along z. With 0 the ground acts on the nodes."""
+    """Radius of the sphere about each end that touches the ground; 0 for points. By default the
+    sphere's radius, else the strut's; 0 for nodes that anchors hold along z."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
-    """Axial force per shortening of a strut, E A / l; none for rigid struts. A strut without load
-    is as long as its nodes are apart in the file. Its force shortens it in equilibrium, and natural
-    frequencies include its stiffness, not the inertia of its elongation: if it is 17, 3.3 or 1
-    times as stiff as its cable, the first is 0.25, 1.2 or 4 % higher than with finite-element rods,
-    the second 0.75, 3.7 or 12 %. In motion it keeps its length."""
+    """Axial force per shortening, E A / l; none for rigid struts. Without load a strut is as long
+    as in the file. Its stiffness counts in equilibrium and in natural frequencies; the inertia of
+    its elongation does not, so the first two frequencies are up to 3.7 % higher than with
+    finite-element rods if it is at least 3.3 times as stiff as its cable, up to 12 % if as stiff.
+    In motion it keeps its length."""
 
 
 class SphereGroup(Section):
@@ -122,30 +121,28 @@ class SphereGroup(Section):
     diameter: Length = Field(gt=0)
     """Diameter of a sphere."""
     density: Density = Field(ge=0)
-    """Density of a sphere. It may be 0 where other parts of the body have mass."""
+    """Density of a sphere; 0 only where other parts of the body have mass."""
     contact_radius: Length | None = Field(default=None, ge=0)
-    """Radius with which a sphere touches the ground; by default its own. The default is 0 for nodes
-    that anchors hold along z."""
+    """Radius with which a sphere touches the ground. By default its own; 0 for nodes that anchors
+    hold along z."""
 
 
 class CableGroup(CableConstants):
     """Cables with the same constants. They never push."""
 
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
-    """The nodes that each cable joins. A cable such as [a, b, c] runs over frictionless rings at
-    its inner nodes, with one tension."""
+    """The nodes of each cable. [a, b, c] runs over a frictionless ring at b, with one tension."""
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Tension per elongation."""
     free_length: Length | None = Field(default=None, ge=0)
-    """Length without tension. A group has a free length or a tension."""
+    """Length without tension. A group has this or a tension."""
     tension: ForceQuantity | None = Field(default=None, ge=0)
     """Tension at the given coordinates of the nodes."""
     factors: Keyed[
         Literal["stiffness", "damping", "free_length", "tension"],
         list[Annotated[float, Field(gt=0)]],
     ] = Field(default={}, exclude_if=operator.not_)
-    """Factors of a number for each cable, in the order of `pairs`, such as `stiffness: [1, 0.98,
-    1.01]`."""
+    """Factors of a number for each cable, in the order of `pairs`: `stiffness: [1, 0.98, 1.01]`."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> CableGroup:
@@ -181,8 +178,7 @@ class BallJoint(Section):
     stiffness: Stiffness | None = Field(default=None, gt=0)
     """Force per distance of the two nodes; by default `joint_stiffness`."""
     time_constant: Time = Field(default=1e-3, ge=0)
-    """Ratio of damping to stiffness. With less than 1 ms, a stiff joint vibrates, and steps are
-    short."""
+    """Ratio of damping to stiffness. Below 1 ms stiff joints vibrate, and steps are short."""
 
 
 class JoinedBody(Section):
@@ -190,7 +186,7 @@ class JoinedBody(Section):
     inertia may be given; what is not given follows from its parts."""
 
     struts: list[str] = Field(default=[])
-    """Groups of struts, such as cage, or single struts by group and nodes, such as cage a b."""
+    """Groups of struts, such as cage, or single struts, such as cage a b."""
     nodes: list[str] = Field(default=[])
     """Further nodes of the body, which need no strut."""
     mass: Mass | None = Field(default=None, gt=0)
@@ -199,8 +195,8 @@ class JoinedBody(Section):
     """Centre of mass [x, y, z] where the nodes are as in the file."""
     inertia: Annotated[list[InertiaQuantity], Field(min_length=3, max_length=6)] | None = None
     """Moments of inertia [xx, yy, zz], or also the matrix's products xy, xz, yz (xy is the integral
-    of -x y dm), about the centre of mass, along the axes of the file. By default the parts' inertia
-    in proportion to the mass."""
+    of -x y dm), about the centre of mass, along the file's axes. By default the parts' inertia in
+    proportion to the mass."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> JoinedBody:
@@ -236,8 +232,7 @@ class StructureFile(RobotSettings):
     format: Literal[1] = Field(default=1, exclude=True)
     """Version of the format of the file."""
     nodes: Keyed[Name, Coordinates] = Field(max_length=MOST_NODES)
-    """Coordinates [x, y, z] of each node, near an equilibrium. A node that nothing else names is
-    left out."""
+    """Coordinates [x, y, z], near an equilibrium. A node that nothing names is left out."""
     unit: str | None = None
     """Unit of coordinates that are bare numbers, such as cm. A robot in mm is shown in mm."""
     struts: Keyed[Name, StrutGroup] = Field(default={})
@@ -248,25 +243,23 @@ class StructureFile(RobotSettings):
     """Nodes at which ball joints hold struts together; elsewhere struts that share a node are one
     body. Each body but the first gets a copy of the node, such as n-2, and a joint of this name."""
     joint_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness of pinned nodes, and of joints that give none. The default is the same as for
-    anchors."""
+    """Stiffness of pinned nodes, and of joints that give none; by default as for anchors."""
     bodies: Keyed[Name, JoinedBody] = Field(default={})
     actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
-    """Names of the cables that each oscillator drives, such as side a b. The nodes in a name may
-    have either order."""
+    """Cables that each oscillator drives, such as side a b, nodes in either order."""
     masses: Keyed[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
-    as a payload that cables hold."""
+    as a payload."""
     loads: Keyed[str, Annotated[list[ForceQuantity], Field(min_length=3, max_length=3)]] = Field(
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
-    """Axes along which the world holds nodes, such as xyz: nodes of struts by a spring and a
-    damper, others are fixed."""
+    """Axes along which the world holds nodes, such as xyz; nodes of struts by a spring and a
+    damper."""
     anchor_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness that holds a node of a strut along each axis of its anchor. The default follows the
-    robot: 1000 times the stiffness of all cables, or more for its weight; see FORMAT.md."""
+    """Stiffness that holds a node of a strut along each axis of its anchor. By default it follows
+    from cables and weight: see FORMAT.md."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness of an anchor; as for joints."""
     contacts: Literal["all"] | list[str] = "all"
@@ -274,11 +267,10 @@ class StructureFile(RobotSettings):
     gravity: Acceleration = Field(default=9.80665, ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
-    its anchors."""
+    """Displacement [x, y, z] of each body at t = 0, but for the axes of its anchors; none if
+    empty."""
     ignored: list[str] | None = None
-    """Settings of an imported file that have no effect, such as friction; noted when the file is
-    read."""
+    """Settings of an imported file that have no effect, such as friction."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
     """Tolerances of numbers of the robot by key, such as `cables.side.stiffness: 2 %` or `nodes: 1
     mm`; or in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""

@@ -99,8 +99,8 @@ class Tetrahedra(RobotSettings):
     """Density of struts and spheres."""
     cables: RowCables
     spacing: Annotated[Spacing, Varied()] = Field(ge=0)
-    """Distance between base triangles at t = 0. `balanced` (or 0): where the cables balance, as in
-    a file that changes its base's strut length, or cables' stiffness or free length."""
+    """Distance between base triangles at t = 0. `balanced` (or 0): where the cables balance; also
+    where a file changes its base's strut length, or cables' stiffness or free length."""
     gravity: Acceleration = Field(ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
@@ -108,12 +108,12 @@ class Tetrahedra(RobotSettings):
     payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
     """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
-    """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
-    foremost tip, which reach flat ground. `all`: all four."""
+    """Nodes that the ground can touch. `thesis`: the bottom nodes and the foremost tip, which reach
+    flat ground. `all`: all four of every tetrahedron."""
     actuation: list[Annotated[list[CableName], Field(min_length=1)]] = Field(
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )
-    """Groups of a junction's cables that share an oscillator, the same for every junction."""
+    """Groups of a junction's cables that share an oscillator."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
     """Tolerances of numbers of the robot by key, such as `cables.outer_stiffness: 2 %`."""
 

@@ -18,8 +18,8 @@ class SimulationSection(Section):
     duration: Time = Field(gt=0, le=1e5)
     """Simulated time."""
     steady_from: Time | None = Field(default=None, ge=0)
-    """Time at which the steady walk begins, for fitness and metrics (thesis section 2.3). If not
-    given, a quarter of the duration, at most 3 s."""
+    """Time at which the steady walk begins, for fitness and metrics (section 2.3). By default a
+    quarter of the duration, at most 3 s."""
     max_evaluations: int = Field(ge=1)
     """Largest number of evaluations of the derivatives in one simulation."""
     sample_period: Time = Field(gt=0)
@@ -27,8 +27,8 @@ class SimulationSection(Section):
     control_period: Time = Field(default=0.02, gt=0)
     """Time between actions of a controller. See td.Simulation."""
     max_speed: Speed | None = Field(default=None, gt=0)
-    """Speed of a body above which a simulation has diverged. By default more than the energy of
-    fall, cables and actuators can give; at least 10.16 m/s."""
+    """Speed of a body above which a simulation has diverged. By default more than fall, cables and
+    actuators can give; at least 10.16 m/s."""
 
     @property
     def settling_time(self) -> float:

@@ -41,14 +41,14 @@ class Tolerance(Section):
 
     size: str
     """Standard deviation of a normal law, or half the width of a uniform one: a share, such as `2
-    %`, or a quantity, such as `1 mm`. 0 for an exact number."""
+    %`, or a quantity, such as `1 mm`."""
     law: Literal["normal", "uniform"] = "normal"
     """Law of the error."""
     each: bool = False
-    """True if each cable, strut or number has an error of its own, as from machining; otherwise all
-    have one in common, as from a supplier. Coordinates always have their own."""
+    """True if each cable, strut or number has an error of its own; otherwise all have one in
+    common. Coordinates always have their own."""
     source: str = "assumed"
-    """Where the tolerance is from, such as a paper or a data sheet."""
+    """Where the tolerance is from, such as a data sheet."""
 
 
 def _also_short(schema: Tree) -> None:
