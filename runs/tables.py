@@ -25,7 +25,7 @@ from page import rendered
 from parting import partings
 from PIL import Image
 from readings import RECORD, load_record
-from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
+from record import DIAGRAM, EXPERIMENTS, PICTURE
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
@@ -174,13 +174,9 @@ def distances_of(run: Analysis, trial: int) -> np.ndarray:
 
 
 def gallery_table(runs: Runs) -> str:
-    """Table of all runs with what their best gaits reach, and the work of two cores."""
-    minutes = {
-        name: sum(stage["cores_s"] for stage in stages.values()) / (2 * 60)
-        for name, stages in load_times(HERE).items()
-    }
+    """Table of all runs with what their best gaits reach."""
     bests, files = best_of_all(runs), {"README": README, "PICTURE": PICTURE, "shown": shown}
-    return rendered("gallery.md", bests=bests, minutes=minutes, **files)
+    return rendered("gallery.md", bests=bests, **files)
 
 
 def differences(runs: Runs) -> pandas.DataFrame:
@@ -229,13 +225,12 @@ def trials_table(name: str, runs: Runs) -> str:
     """Table of the fittest gait of each trial of a run, on all engines and on disturbed robots.
     Below it, the trials with different distances on the engines."""
     run, units, rows = runs[name], scenario_of(name).units, []
-    for trial, gait in run.best_gaits.iterrows():
-        judged, (compiled, diagram, mujoco) = run.disturbed.loc[trial], distances_of(run, trial)
+    for trial in run.best_gaits.index:
+        compiled, diagram, mujoco = distances_of(run, trial)
         row = {
             "trial": trial,
             "distances": np.array([compiled, diagram, mujoco]) / units.length,
-            "kept": 100.0 * judged[["kept", "kept_low", "kept_high"]].to_numpy(),
-            "cost": gait["cost_of_transport"],
+            "kept": 100.0 * run.disturbed.loc[trial, "kept"],
             "is_apart": not abs(compiled - diagram) <= APART,
         }
         rows.append(row)
