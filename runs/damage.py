@@ -342,10 +342,10 @@ def planned(rows: Sequence[Row]) -> pandas.DataFrame:
 
 def by_cable(shares: pandas.DataFrame, plans: pandas.DataFrame) -> pandas.DataFrame:
     """Numbers of each cable, left and right ones together."""
-    table = shares.assign(back=shares["found"] >= GOAL).groupby("group", sort=False)
-    medians = table[["lost", "found", "of_best", "trials"]].median()
-    counts = {"robots": table.size(), "least": table["found"].min(), "back": table["back"].mean()}
-    return medians.assign(**counts, planner=plans.groupby("group")["share"].mean())
+    table = shares.groupby("group", sort=False)
+    planner = plans.groupby("group")["share"].mean()
+    medians = table[["lost", "found", "trials"]].median()
+    return medians.assign(least=table["found"].min(), planner=planner)
 
 
 _PLANNER: Any = {"color": "black", "marker": "x", "linestyle": "", "markersize": 4.0}
@@ -406,7 +406,6 @@ def page(walks: Sequence[Row], plan_rows: Sequence[Row], candidates: Sequence[Ro
         turns=len(TURNS),
         steady=scenario().simulation.settling_time,
         reach=REACH,
-        goal=GOAL,
     )
 
 
