@@ -34,9 +34,8 @@ def test_an_editor_knows_units_defaults_tags_and_keys_that_files_alone_have():
     for key, node in schema["properties"].items():
         for kind in (kind["title"] for kind in members_of(node, schema) if "title" in kind):
             tags += [f"{kind} mapping", *([] if needs_keys(key, kind) else [f"{kind} scalar:null"])]
-    page = (SCENARIOS / "FORMAT.md").read_text(encoding="utf-8")
-    (told,) = re.findall(r'"yaml.customTags": (\[.*?\])', page, re.S)
-    assert json.loads(told) == list(dict.fromkeys(tags))
+    settings = json.loads((SCENARIOS / "vscode.json").read_text(encoding="utf-8"))
+    assert settings == {"yaml.customTags": list(dict.fromkeys(tags))}
 
 
 def needs_keys(section: str, kind: str) -> bool:
