@@ -331,7 +331,7 @@ class LimitedActuator(ActuatorKind):
     """An actuator of limited force and speed on each driven cable. The cable never pushes."""
 
     max_force: ForceQuantity = Field(gt=0)
-    """Tension at which the actuator stalls. A greater tension pulls a winch backward."""
+    """Tension at which the actuator stalls. A greater one pulls a winch backward."""
     max_speed: Speed = Field(gt=0)
     """Speed at which the actuator winds a cable without tension."""
     time_constant: Time = Field(gt=0)

@@ -455,9 +455,9 @@ class Coulomb(FrictionKind):
     forward: float = Field(default=1.0, gt=0)
     """Factor on the coefficients for slip along the body's heading."""
     backward: float = Field(default=1.0, gt=0)
-    """Factor on the coefficients for slip against the body's heading."""
+    """The factor for slip backward."""
     lateral: float = Field(default=1.0, gt=0)
-    """Factor on the coefficients for sideways slip."""
+    """The factor for sideways slip."""
 
     @model_validator(mode="after")
     def _check(self) -> Coulomb:

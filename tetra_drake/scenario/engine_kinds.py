@@ -35,8 +35,8 @@ class Drake(EngineSettings):
 
     module: ClassVar[str] = "tetra_drake.engines.drake"
     scheme: Literal["radau3", "runge_kutta3"] | None = None
-    """Implicit (radau3) or explicit (runge_kutta3) integrator. By default radau3 up to 12 bodies;
-    for n more runge_kutta3, unless dampers stop the fastest motion at a rate above 14 n² per
+    """Implicit (radau3) or explicit (runge_kutta3) integrator. By default radau3 for n up to 12
+    bodies; for more runge_kutta3, unless dampers stop the fastest motion at a rate above 14 n² per
     second."""
     accuracy: float | None = Field(default=None, gt=0)
     """Target accuracy per step. By default half the least damping ratio of a cable, anchor or joint
@@ -90,7 +90,7 @@ class Mujoco(EngineSettings):
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)
     has_cone: ClassVar[bool] = True
     step: Time = Field(default=0.0625e-3, ge=1e-7, le=1)
-    """Time step. A simulation fails at once if it is too long for springs and dampers."""
+    """Time step. One that is too long for springs and dampers fails at once."""
 
 
 EngineKind = Annotated[Drake | Compiled | Mujoco, Kinds(EngineSettings)]

@@ -41,7 +41,6 @@ _LIMITS = {
 _ABOUT_METRICS = """\
 `require` limits a cost from above, any other metric from below. Some metrics are of the named
 robots alone."""
-_LENGTHS = {"minItems": "≥ {} items", "maxItems": "≤ {} items"}
 
 
 def schema_text(*, structure: bool = False) -> str:
@@ -138,8 +137,7 @@ def _value(node: Tree) -> str:
     limits = [text.format(plainest(node[n], unit)) for n, text in _LIMITS.items() if n in node]
     if {"minimum", "maximum"} <= node.keys():
         limits = [f"{plainest(node['minimum'], unit)} to {plainest(node['maximum'], unit)}"]
-    lengths = [text.format(node[n]) for n, text in _LENGTHS.items() if n in node]
-    return ", ".join([words, *limits, *lengths])
+    return ", ".join([words, *limits])
 
 
 if __name__ == "__main__":

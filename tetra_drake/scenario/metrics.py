@@ -164,11 +164,12 @@ class WalkMetrics:
 
 @dataclass(frozen=True)
 class Metrics(TalliedMetrics, WalkMetrics):
-    """Metrics of a simulation, in SI units. T1's bottom left node is at x₁ and y₁, its bottom right
-    node at x₂, the tip of the front tetrahedron at x₃. Robots other than rows of tetrahedra have x₁
-    and y₁ at the centre of mass, here called the centre. The steady stretch begins at
-    `simulation.steady_from`, or at `cpg.start_up` if it is later, and lasts to the end. A metric
-    that does not apply to a robot is NaN.
+    """Metrics of a simulation, in SI units.
+
+    T1's bottom left node is at x₁ and y₁, its bottom right node at x₂, the front tip at x₃. Robots
+    other than rows of tetrahedra have x₁ and y₁ at the centre of mass, here called the centre. The
+    steady stretch goes from `simulation.steady_from`, or `cpg.start_up` if it is later, to the end.
+    A metric that does not apply to a robot is NaN.
     """
 
     lifted_shares: tuple[float, ...] = ()

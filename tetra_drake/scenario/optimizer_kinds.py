@@ -55,15 +55,15 @@ class SteadyState(OptimizerSettings):
 
 
 class CmaEs(OptimizerSettings):
-    """Settings of covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772): gaits are drawn
-    from a normal distribution that adapts to the fittest. A search that has converged restarts
-    around its best gait, with twice the population; where it has stalled, a new one begins
+    """Settings of covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
+
+    Gaits are drawn from a normal distribution that adapts to the fittest. A search that has
+    converged restarts around its best gait, with twice the population; one that has stalled begins
     elsewhere.
     """
 
     population: int | None = Field(default=None, ge=4, le=MOST_GAITS)
-    """Number of vectors in an iteration. The default is 4 + 3 ln n, rounded down, for n
-    parameters."""
+    """Number of vectors in an iteration; by default 4 + 3 ln n, rounded down, for n parameters."""
     sample: int = Field(default=40, ge=0, le=MOST_GAITS)
     """Number of random gaits that are evaluated before each search."""
     starts: int = Field(default=5, ge=1, le=1000)
@@ -80,10 +80,11 @@ CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
 class QualityDiversity(OptimizerSettings):
-    """Settings of a search for a map of two metrics with the fittest gait in each cell, by CMA-MAE
-    of pyribs (extra `qd`; Fontaine and Nikolaidis, arXiv 2205.10752). A cell's level of fitness
-    slowly follows its fittest gait; several runs of CMA-ES look for gaits above the level of their
-    cell.
+    """Settings of a search for a map of two metrics with the fittest gait in each cell.
+
+    By CMA-MAE of pyribs (extra `qd`; Fontaine and Nikolaidis, arXiv 2205.10752): a cell's level of
+    fitness slowly follows its fittest gait, and several runs of CMA-ES look for gaits above the
+    level of their cell.
     """
 
     module: ClassVar[str] = "tetra_drake.lab.elites.quality_diversity"

@@ -103,7 +103,7 @@ class StrutGroup(Section):
     """Diameter of the spheres; 0 for none. A node's first strut in the file counts."""
     contact_radius: Length | None = Field(default=None, ge=0)
     """Radius of the sphere about each end that touches the ground; 0 for points. By default the
-    sphere's radius, else the strut's; 0 for nodes that anchors hold along z."""
+    sphere's, else the strut's; 0 where an anchor holds along z."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
     """Axial force per shortening, E A / l; none for rigid struts. Without load a strut is as long
     as in the file. Its stiffness counts in equilibrium and in natural frequencies; the inertia of
@@ -123,8 +123,8 @@ class SphereGroup(Section):
     density: Density = Field(ge=0)
     """Density of a sphere; 0 only where other parts of the body have mass."""
     contact_radius: Length | None = Field(default=None, ge=0)
-    """Radius with which a sphere touches the ground. By default its own; 0 for nodes that anchors
-    hold along z."""
+    """Radius with which a sphere touches the ground. By default its own; 0 where an anchor holds
+    along z."""
 
 
 class CableGroup(CableConstants):
@@ -241,7 +241,7 @@ class StructureFile(RobotSettings):
     joints: Keyed[Name, BallJoint] = Field(default={})
     pinned: list[str] = Field(default=[], exclude=True)
     """Nodes at which ball joints hold struts together; elsewhere struts that share a node are one
-    body. Each body but the first gets a copy of the node, such as n-2, and a joint of this name."""
+    body. Each body but the first gets a copy of the node, n-2, and a joint of this name."""
     joint_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
     """Stiffness of pinned nodes, and of joints that give none; by default as for anchors."""
     bodies: Keyed[Name, JoinedBody] = Field(default={})
@@ -267,13 +267,12 @@ class StructureFile(RobotSettings):
     gravity: Acceleration = Field(default=9.80665, ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0, but for the axes of its anchors; none if
-    empty."""
+    """Displacement [x, y, z] of each body at t = 0, but for the axes of its anchors."""
     ignored: list[str] | None = None
     """Settings of an imported file that have no effect, such as friction."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key, such as `cables.side.stiffness: 2 %` or `nodes: 1
-    mm`; or in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
+    """Tolerances of numbers of the robot by key: `cables.side.stiffness: 2 %`, `nodes: 1 mm`; also
+    in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.

@@ -62,7 +62,7 @@ class RowCables(CableConstants):
     """The cables of a row of tetrahedra (Table 3 of the thesis)."""
 
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
-    """Stiffness of outer cables, which join base nodes of the same name."""
+    """Stiffness of outer cables, which join base nodes of one name."""
     inner_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of inner cables, from a tip to base nodes."""
     free_length: Length = Field(ge=0)
@@ -104,9 +104,9 @@ class Tetrahedra(RobotSettings):
     gravity: Acceleration = Field(ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
+    """Displacement [x, y, z] of each tetrahedron at t = 0."""
     payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
-    """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
+    """Point mass at the centre of each tetrahedron, such as its motors."""
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the bottom nodes and the foremost tip, which reach
     flat ground. `all`: all four of every tetrahedron."""

@@ -40,13 +40,13 @@ class Tolerance(Section):
     mm uniform` or `2 % each`."""
 
     size: str
-    """Standard deviation of a normal law, or half the width of a uniform one: a share, such as `2
-    %`, or a quantity, such as `1 mm`."""
+    """Standard deviation of a normal law, or half the width of a uniform one: a share, `2 %`, or a
+    quantity, `1 mm`."""
     law: Literal["normal", "uniform"] = "normal"
     """Law of the error."""
     each: bool = False
-    """True if each cable, strut or number has an error of its own; otherwise all have one in
-    common. Coordinates always have their own."""
+    """True if each cable, strut or number has an error of its own, as coordinates always have;
+    otherwise all have one in common."""
     source: str = "assumed"
     """Where the tolerance is from, such as a data sheet."""
 
