@@ -182,7 +182,11 @@ def write_page(folder: Path, planned: Mapping[str, int]) -> None:
     cpu = [each for records in goals.values() for record in records for each in record["cpu"]]
     text = rendered(
         "planning.md",
-        runs_of=[f"{len(each)} of {planned[group]} ({group})" for group, each in groups.items()],
+        unfinished=[
+            f"{len(each)} of {planned[group]} ({group})"
+            for group, each in groups.items()
+            if len(each) < planned[group]
+        ],
         groups=groups,
         goals=goals,
         costs={
