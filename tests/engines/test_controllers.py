@@ -4,8 +4,8 @@ import functools
 
 import numpy as np
 import pytest
+from helpers.controllers import Springs
 from helpers.converged import shortly
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
@@ -76,22 +76,6 @@ def test_what_a_controller_raises_comes_through_as_it_is(walking, engine, kind):
     assert caught.value is error
 
 
-@pytest.mark.parametrize(
-    ("actions", "key", "facts"),
-    [
-        (np.ones(3), "actions", ("the shape (3,)", "(4,)")),
-        ("fast", "actions", ("'fast'",)),
-        ([1.0, 1.0, np.nan, 1.0], "actions[2]", ("nan",)),
-    ],
-)
-def test_wrong_actions_of_a_controller_are_told_in_a_line(
-    walking, engine, actions, key, facts, refused
-):
-    short = shortly(walking, 0.1, engine=engine)
-    with refused("controller", key, *facts):
-        simulate(short, controller=lambda time, _: actions if time > 0.05 else np.ones(4))
-
-
 def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
     """The function is called at the same times, and its forces are held."""
     accurate = Drake(accuracy=1e-5, max_step=1e-3)
@@ -116,44 +100,12 @@ def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
     np.testing.assert_allclose(signals, result.trajectory.signal[-1], atol=1e-4)
 
 
-class Springs(LeafSystem):
-    """A controller of ports of these names and sizes. It has no state, so its signals depend on
-    its inputs at the same time: they are the sum of these for the driven cables."""
-
-    def __init__(self, robot: Robot, inputs: dict[str, int], outputs: dict[str, int]) -> None:
-        super().__init__()
-        self._driven = robot.driven
-        self._ports = [self.DeclareVectorInputPort(name, size) for name, size in inputs.items()]
-        for name, size in outputs.items():
-            self.DeclareVectorOutputPort(name, size, self._calc)
-
-    def _calc(self, context: Context, output: BasicVector) -> None:
-        sums = sum(port.Eval(context) for port in self._ports)[self._driven]
-        output.SetFromVector(sums[: output.size()])
-
-
 def test_a_controller_makes_no_algebraic_loop_and_may_have_further_outputs(walking, refused):
     robot = controlled_robot(walking)
     springs = Springs(robot, {"lengths": 12, "rates": 12}, {"errors": 2, "signals": 4})
     diagram = MakeTensegrityDiagram(robot, controller=springs)
     found = diagram.GetOutputPort("signals").Eval(diagram.CreateDefaultContext())
     np.testing.assert_allclose(found, robot.starting_cables().length, rtol=1e-12)
-
-
-OTHER_PORTS = [
-    ({}, {}, ("no output ports", "'signals'", "4")),
-    ({}, {"y": 4}, ("found y", "'signals'", "4")),
-    ({}, {"signals": 3}, ("'signals'", "size 3", "4")),
-    ({"lengths": 11}, {"signals": 4}, ("'lengths'", "size 11", "12")),
-    ({"state": 12}, {"signals": 4}, ("'state'", "size 12", "39")),
-]
-
-
-@pytest.mark.parametrize(("inputs", "outputs", "facts"), OTHER_PORTS)
-def test_a_controller_of_other_ports_is_refused(walking, refused, inputs, outputs, facts):
-    robot = controlled_robot(walking)
-    with refused("MakeTensegrityDiagram", "controller", *facts):
-        MakeTensegrityDiagram(robot, controller=Springs(robot, inputs, outputs))
 
 
 def test_free_input_ports_of_a_controller_are_ports_of_the_diagram(walking):
@@ -192,23 +144,3 @@ def test_a_robot_without_signals_needs_none():
     diagram = MakeTensegrityDiagram(robot)
     assert diagram.num_input_ports() == 0
     assert diagram.GetOutputPort("signals").size() == 0
-
-
-def test_a_scene_graph_without_meshcat_has_struts_and_cables(walking):
-    robot = Robot.of(walking)
-    plain, diagram = MakeTensegrityDiagram(robot), MakeTensegrityDiagram(robot, scene_graph=True)
-    assert not plain.HasSubsystemNamed("scene_graph")
-    context = diagram.CreateDefaultContext()
-    query = diagram.GetOutputPort("query_object").Eval(context)
-    inspector = query.inspector()
-    sources = [inspector.GetName(one) for one in inspector.GetAllSourceIds()]
-    assert {"plant", "cables"} <= set(sources)
-    names = [inspector.GetName(one) for one in inspector.GetAllFrameIds()]
-    assert {f"{cable} 0" for cable in robot.structure.cable_names} <= set(names)
-
-
-@pytest.mark.parametrize("key", ["robot", "gait", "controller", "scene_graph", "meshcat"])
-def test_an_argument_of_another_type_is_refused(walking, refused, key):
-    given = {"robot": Robot.of(walking)} | {key: "word"}
-    with refused("MakeTensegrityDiagram", key, "'word'"):
-        MakeTensegrityDiagram(**given)

@@ -6,14 +6,14 @@ import shutil
 import numpy as np
 import pytest
 from helpers.brief import BRIEF
+from helpers.policies import own
 
 import tetra_drake as td
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.errors import InputError
 from tetra_drake.robot.command import Command, controlled_robot
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.gait_file import load_gait, save_gait
+from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
@@ -154,60 +154,8 @@ def test_the_export_of_a_policy_says_that_it_was_in_a_loop(tmp_path):
     assert played == pytest.approx(simulate(scenario, gait).metrics.distance, abs=1e-3)
 
 
-def short(readings, parameters, robots):
-    return parameters[:, :1]
-
-
-def undefined(readings, parameters, robots):
-    return np.where(readings.time[:, np.newaxis] > 0.05, np.nan, robots.rest)
-
-
-def own(readings, parameters, robots):
-    return robots.rest + parameters * readings.rates[:, :1]
-
-
 def test_a_policy_of_ones_own_is_found_by_its_import_path():
-    scenario = brief(policy=f"!Python {{function: '{__name__}:own', count: 1}}")
+    scenario = brief(policy="!Python {function: helpers.policies:own, count: 1}")
     result = simulate(scenario, td.seeded_gait(scenario))
     assert result.metrics.to_json() != simulate(scenario, Gait("", {"parameter 1": 0.0})).metrics
-
-
-@pytest.mark.parametrize(
-    ("policy", "expected"),
-    [
-        ("!Python {function: 'nowhere:f', count: 1}", "policy.function: nowhere:f: cannot be"),
-        (f"!Python {{function: '{__name__}:ENGINES', count: 1}}", "expected a function"),
-        (f"!Python {{function: '{__name__}:short', count: 2}}", "short: found the shape (1, 1)"),
-        (
-            f"!Python {{function: '{__name__}:undefined', count: 1}}",
-            "undefined[0, 0]: found nan",
-        ),
-        ("!Linear {readings: [lengths, smells]}", "smells"),
-        ("!Linear {readings: [lengths, lengths]}", "policy.readings: found"),
-        ("!Python {function: 'm:f', count: 1, bounds: [1, 0]}", "policy.bounds: found 1 to 0"),
-    ],
-)
-def test_a_wrong_policy_is_refused(policy, expected):
-    with pytest.raises(InputError) as error:
-        scenario = brief(policy=policy)
-        simulate(scenario, td.seeded_gait(scenario))
-    assert expected in str(error.value) and "\n" not in str(error.value)
-
-
-def test_what_does_not_go_with_a_policy_is_refused(tmp_path):
-    scenario, thesis = brief(), load_scenario("thesis")
-    gait, values = td.seeded_gait(thesis), td.seeded_gait(scenario)
-    for key, value in {"cpg.feedback": ["load"], "simulation.control_period": "0.7 ms"}.items():
-        with pytest.raises(InputError, match=key):
-            scenario.with_changes({key: value, "cpg.signals": "live"})
-    with pytest.raises(InputError, match="unknown names, such as 'weight"):
-        simulate(scenario, gait)
-    with pytest.raises(InputError, match="lacks 26 names"):
-        simulate(thesis, values)
-    with pytest.raises(InputError, match="steering"):
-        simulate(scenario, values, steering=0.5)
-    save_gait(gait, tmp_path / "gait.json", thesis)
-    with pytest.raises(InputError, match="unknown names, such as 'weight"):
-        load_gait(tmp_path / "gait.json", scenario)
-    assert ParameterSpace.of(scenario).vector(values).tolist() == list(values.parameters.values())
-    assert imported_function(f"{__name__}:own") is own
+    assert imported_function("helpers.policies:own") is own

@@ -6,12 +6,10 @@ a difference of 9e-8 m.
 """
 
 import dataclasses
-import functools
 import json
 
 import numpy as np
 import pytest
-from helpers.actuations import SIDES
 from helpers.anchored import BAR, floating_prism
 from helpers.converged import shortly
 from helpers.kernels import Stepper
@@ -24,8 +22,7 @@ from helpers.structures import (
 )
 
 from tetra_drake.engines.mujoco import installed
-from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
-from tetra_drake.experiment import evolve
+from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.cable import LENGTH, PASSIVE
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
@@ -119,19 +116,6 @@ def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_na
     for robot in (alike, general):
         poses = poses_of(simulated(robot)[1].states)
         np.testing.assert_allclose(poses[..., 4:], expected[..., 4:], rtol=0, atol=allowed)
-
-
-def test_opposite_turns_of_a_mirrored_gait_lead_to_mirror_images():
-    changes = BRIEF | {"engine": "!Compiled", "cpg.signals": "live", "gait_bounds.mirrored": True}
-    changes |= {"robot.tetrahedra": 2} | SIDES
-    row = Robot.of(load_scenario("coulomb").with_changes(changes))
-    scenario = row.scenario.with_changes(
-        {"robot": row_as_kind(row), "objective": {"speed": "1 s/m"}}
-    )
-    gait = seeded_gait(scenario, 3)
-    left, right = (simulate(scenario, gait, steering=turn).path.centre for turn in (0.6, -0.6))
-    np.testing.assert_allclose(left * [1.0, -1.0, 1.0], right, atol=1e-5)
-    assert np.ptp(left[:, 1]) > 5e-4, "it turns"
 
 
 def felt(robot: Robot, *, longer: float = 1.0, pushes: float = 0.0, **gains: float):
@@ -248,13 +232,6 @@ def test_a_cable_over_fixed_rings_pulls_alike_on_all_engines(engine, path):
 
     moved = ends("!Drake {scheme: runge_kutta3, accuracy: 1e-7}")
     np.testing.assert_allclose(ends(engine), moved, atol=1e-4)
-
-
-def test_a_robot_that_nothing_drives_has_no_gaits_to_search(undriven, refused, tmp_path):
-    for search in (check_scenario, functools.partial(evolve, out=tmp_path / "run")):
-        with refused(undriven.name, "robot.actuated", "oscillator"):
-            search(undriven)
-    assert not (tmp_path / "run").exists()
 
 
 def test_what_a_structure_lacks_is_null_in_its_result(tmp_path):
