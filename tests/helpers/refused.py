@@ -20,8 +20,9 @@ import tetra_drake as td
 from helpers.actuations import WINCH
 from helpers.anchored import HUNG, scenario_of
 from helpers.brief import BRIEF
-from helpers.controllers import Springs
+from helpers.controllers import OwnGround, Springs
 from helpers.converged import shortly
+from helpers.made_up_walk import make_walk
 from helpers.rod import LAW, rod_with_tendons
 from tetra_drake.engines.drake import MakeDisturbedSimulator
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
@@ -243,3 +244,14 @@ def with_controller(inputs: dict[str, int], outputs: dict[str, int]):
     """A diagram of three tetrahedra whose controller has these ports."""
     driven = controlled_robot(scenario("coulomb", {"robot.tetrahedra": 3}))
     MakeTensegrityDiagram(driven, controller=Springs(driven, inputs, outputs))
+
+
+def with_ground(ground: OwnGround, changes: Any = None, **options: Any):
+    """A diagram of the thesis's robot on a ground of one's own."""
+    given = robot("thesis", changes), gait("thesis", changes)
+    MakeTensegrityDiagram(*given, ground=ground, **options)
+
+
+def walk():
+    """A recorded walk of two tetrahedra."""
+    return make_walk(bodies=2, duration=0.1)

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from helpers.rod import GRAVITY, LAW, LEFT, LENGTH, MASS, RIGHT, rod_with_tendons
-from helpers.springs import with_springs
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
@@ -22,7 +19,6 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.laws.actuator import Winch
-from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Flat
@@ -30,7 +26,7 @@ from tetra_drake.robot.ground import make_surface
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.systems import AddCables, AddFrame, AddGroundContact, Cable
+from tetra_drake.systems import AddCables, AddGroundContact, Cable
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 WINCH = Winch(max_force=1e6, max_speed=1e3, time_constant=0.05)
@@ -78,33 +74,6 @@ def test_an_arm_swings_on_a_cable_over_a_ring_at_its_tip_as_its_energy_says():
     assert np.abs(expected).min() > 0.1
     found = state_at(builder.Build(), 0.5, accuracy=1e-5)
     np.testing.assert_allclose(found, expected, rtol=1e-4)
-
-
-def test_tendons_of_an_arm_of_drakes_are_its_linear_spring_dampers():
-    def moved(attach: Callable[..., None], state: list[float]) -> np.ndarray:
-        builder = DiagramBuilder()
-        plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-        Parser(plant).AddModelsFromUrl("package://drake/examples/acrobot/Acrobot.urdf")
-        ends = [
-            (plant.world_frame(), [0.3, 0.1, 0.0]),
-            (plant.GetFrameByName("upper_link"), [0.0, 0.02, -0.7]),
-            (plant.GetFrameByName("lower_link"), [0.0, 0.0, -1.0]),
-        ]
-        frames = [AddFrame(plant, f"end {i}", *end) for i, end in enumerate(ends)]
-        law = CableLaw(stiffness=40.0, damping=1.5, free_length=0.1)
-        pairs = {"upper": frames[:2], "lower": frames[1:], "both": [frames[0], frames[2]]}
-        attach(builder, plant, [Cable(name, a, b, law) for name, (a, b) in pairs.items()])
-        diagram = builder.Build()
-        plant.SetDefaultPositions(state)
-        return state_at(diagram, 0.5)
-
-    def with_cables(builder: DiagramBuilder, plant: MultibodyPlant, cables: list[Cable]) -> None:
-        plant.Finalize()
-        AddCables(builder, plant, cables=cables, slack=False)
-
-    expected = moved(with_springs, [0.7, -1.1])
-    assert np.abs(expected[2:]).min() > 0.1  # it swings
-    np.testing.assert_allclose(moved(with_cables, [0.7, -1.1]), expected, atol=1e-6)
 
 
 def test_a_hinged_rod_sinks_into_the_ground_by_half_its_weight_over_the_stiffness():

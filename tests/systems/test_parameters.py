@@ -104,19 +104,6 @@ def test_a_number_for_all_cables(robots):
     assert [set(row) for row in law] == [{100.0}, {2.0}, {0.05}, {1.0}]
 
 
-def test_a_clone_has_its_own_constants(robots):
-    diagram = diagram_of(robots[0], parameters=True)
-    clone, context = diagram.Clone(), moving(diagram)
-    of_clone = clone.CreateDefaultContext()
-    of_clone.SetTimeStateAndParametersFrom(context)  # a clone of a plant forgets default poses
-    before = rates(diagram, context)
-    np.testing.assert_array_equal(rates(clone, of_clone), before)
-    put(diagram, context, robots[1])
-    assert np.abs(rates(diagram, context) - before).max() > 1.0
-    of_clone.SetContinuousState(of_clone.get_continuous_state_vector().CopyToVector())
-    np.testing.assert_array_equal(rates(clone, of_clone), before)
-
-
 def test_tensions_have_derivatives_by_the_constants(robots):
     """dT/dk of a cable at rest is its stretch; this robot's cables also push."""
     structure, law = robots[0].structure, robots[0].model.cables.law
