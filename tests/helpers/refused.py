@@ -33,6 +33,7 @@ from tetra_drake.lab.fit.fit import fit
 from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.lab.linearization.linearization import linearize
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.study.sweep import sweep
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.contact import MODE_COLUMNS, GroundSection, NormalForce
 from tetra_drake.laws.friction import Coulomb
@@ -42,7 +43,6 @@ from tetra_drake.robot.ground import make_surface
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import save_signals
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.study.sweep import sweep
 from tetra_drake.systems import AddCables, AddGroundContact, Cable
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
