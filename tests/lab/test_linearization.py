@@ -22,11 +22,7 @@ from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
 from tetra_drake.lab.linearization.linearization import Linearization, linearize
-<<<<<<< HEAD
-=======
-from tetra_drake.lab.linearization.rates import rates_and_forces
 from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
->>>>>>> e74ec3557b0a1f1b0b22125bc8118a3984926541
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.robot.readings import first_readings
 from tetra_drake.robot.robot import Robot
