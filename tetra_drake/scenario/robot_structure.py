@@ -24,6 +24,7 @@ from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_stretch
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
+from tetra_drake.scenario.start import Start
 from tetra_drake.scenario.structure_graph import (
     Member,
     Pair,
@@ -276,6 +277,8 @@ class StructureFile(RobotSettings):
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
     its anchors."""
+    start: Start | None = Field(default=None, exclude_if=operator.not_)
+    """How the robot is turned and moves at t = 0; at rest if there is none."""
     ignored: list[str] | None = None
     """Settings of an imported file that have no effect, such as friction; noted when the file is
     read."""
@@ -324,6 +327,7 @@ class StructureFile(RobotSettings):
             anchor_damping=self.anchor_time_constant * held,
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
+            start=self.start,
             **cables,
             **self._joints_of(number, body_of),
             given_inertia={
@@ -618,17 +622,20 @@ class ParametricRobot(RobotSettings):
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty."""
+    start: Start | None = Field(default=None, exclude_if=operator.not_)
+    """How the robot is turned and moves at t = 0; at rest if there is none."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
     """Tolerances of numbers of the robot by key."""
 
     def structure(self) -> StructureFile:
-        """The structure for these settings. Its gravity, offsets and tolerances are not used."""
+        """The structure for these settings. Its gravity and tolerances are not used."""
         raise NotImplementedError
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the structure."""
         made = self.structure().blueprint()
-        return dataclasses.replace(made, offsets=np.array(self.offsets or made.offsets))
+        moved = np.array(self.offsets or made.offsets)
+        return dataclasses.replace(made, offsets=moved, start=self.start or made.start)
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Self:
