@@ -24,7 +24,7 @@ from tetra_drake.errors import (
     check_whole,
     checked_numbers,
 )
-from tetra_drake.laws.cable import CableLaw
+from tetra_drake.laws.cable import NUMBERS, CableLaw
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import checked_actions, checked_period, controlled_robot
@@ -115,7 +115,7 @@ class Simulation:
         self._batch = self._new_batch()
         self._owner, self._is_whole = threading.RLock(), True
         shape = count, self.robot.driven.size
-        self._law: Any = CableLaw._make(np.empty((len(CableLaw._fields), *shape)))
+        self._law: Any = CableLaw(*np.empty((len(NUMBERS), *shape)))
         self._steps = np.zeros(count, dtype=int)
         self.rest: np.ndarray = np.empty(shape)
         """Actions (N, actions) at the start, where the robots rest."""
@@ -438,7 +438,7 @@ class Simulation:
     def _put(self, place: int, identity: str, robot: Robot) -> None:
         """Makes a robot the one of a place, before it begins there."""
         cables = robot.starting_cables()
-        for values, its in zip(self._law, cables.law, strict=True):
+        for values, its in zip(self._law[:-1], cables.law[:-1], strict=True):
             values[place] = its
         self.rest[place] = robot.scenario.actuation.commands(cables)
         self._robots[place], self._identities[place] = robot, identity

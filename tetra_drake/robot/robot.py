@@ -118,7 +118,10 @@ class Robot:
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
-                laws[number] = dict.fromkeys(laws[number], 0.0)
+                law = laws[number]
+                laws[number] = dict.fromkeys(law, 0.0)
+                if "curve" in law:
+                    laws[number]["curve"] = law["curve"].scaled(0.0)
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),

@@ -71,7 +71,8 @@ class CableNetwork(ConvertibleSystem):
     has no direction: the outputs raise SimulationFailure.
 
     With `parameters`, the constants of the cables are parameters of the context (4*cables,): each
-    field of laws.cable.CableLaw for all cables, one field after the other; see SetLaw().
+    number of laws.cable.CableLaw for all cables, one after the other, then the rows of their
+    curves, if any; see SetLaw().
     """
 
     def __init__(
@@ -82,8 +83,9 @@ class CableNetwork(ConvertibleSystem):
         signals, not the signals themselves."""
         super().__init__()
         self._names = names
-        self._constants = np.concatenate(model.cables.law)  # a copy, which a context may replace
-        law = _law_of(self._constants)
+        self._curve = model.cables.law.curve
+        self._constants = _numbers_of(model.cables.law)  # a copy, which a context may replace
+        law = _law_of(self._constants, self._curve)
         model = model._replace(cables=model.cables._replace(law=law))
         self._has_parameters = parameters
         if parameters:
@@ -123,20 +125,25 @@ class CableNetwork(ConvertibleSystem):
         """Constants of the cables in a context of this system: a CableLaw of arrays (cables,), in
         the order of the cables. Raises InputError if they are no parameters."""
         check_parameters("GetLaw", self, context)
-        return _law_of(context.get_numeric_parameter(0).CopyToVector())
+        return _law_of(context.get_numeric_parameter(0).CopyToVector(), self._curve)
 
     def SetLaw(self, context: Context, law: cable.CableLaw) -> None:
         """Replaces the constants of the cables in a context of this system.
 
-        The states of actuators stay. Each field of `law` is an array (cables,), or one number for
-        all cables. Raises InputError if the constants are no parameters, or one of them is negative
-        or not finite.
+        The states of actuators stay. Each number of `law` is an array (cables,), or one number for
+        all cables; its curves are like the present ones, or the present ones stay. Raises
+        InputError if the constants are no parameters, or one of them is negative or not finite.
         """
         check_parameters("SetLaw", self, context)
         check_type("SetLaw", "law", law, cable.CableLaw)
-        given, count = law._asdict().items(), len(self._names)
+        curve, own, count = law.curve, self.GetLaw(context).curve, len(self._names)
+        if curve.pieces and (np.shape(curve.rows) != own.rows.shape or np.isnan(curve.rows).any()):
+            problem = f"found {np.shape(curve.rows)} numbers, expected {own.rows.shape}, none NaN"
+            raise InputError("SetLaw", "curve", problem)
+        given = zip(cable.NUMBERS, law, strict=False)
         rows = [numbers_for_each("SetLaw", key, row, count=count, least=0.0) for key, row in given]
-        context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(rows))
+        numbers = _numbers_of(cable.CableLaw(*rows, curve=curve if curve.pieces else own))
+        context.get_mutable_numeric_parameter(0).SetFromVector(numbers)
 
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
@@ -174,11 +181,18 @@ class CableNetwork(ConvertibleSystem):
         return self._forces.drives[:, actuator.RATE]
 
 
-def _law_of(constants: np.ndarray) -> cable.CableLaw:
+def _numbers_of(law: cable.CableLaw) -> np.ndarray:
+    """The parameters of a CableNetwork: the constants of all cables, field after field, then their
+    curves."""
+    return np.concatenate([*law[:-1], law.curve.rows.ravel()])
+
+
+def _law_of(constants: np.ndarray, curve: cable.Curve) -> cable.CableLaw:
     """The parameters of a CableNetwork as a CableLaw of arrays (cables,), which share their
-    memory."""
-    rows: Any = np.split(constants, len(cable.CableLaw._fields))
-    return cable.CableLaw(*rows)
+    memory, with a curve like `curve`."""
+    numbers, rows = np.split(constants, [constants.size - curve.rows.size])
+    fields: Any = np.split(numbers, len(cable.NUMBERS))
+    return cable.CableLaw(*fields, curve=curve._replace(rows=rows.reshape(-1, 5)))
 
 
 @dataclass(frozen=True)
@@ -306,7 +320,8 @@ def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
         if any(one.name == earlier.name for earlier in cables[:place]):
             raise InputError("AddCables", key, "is given twice")
         check_type("AddCables", f"{key}.law", one.law, cable.CableLaw)
-        check_constants("AddCables", key, one.law._asdict())
+        check_constants("AddCables", key, dict(zip(cable.NUMBERS, one.law, strict=False)))
+        check_type("AddCables", f"{key}.law.curve", one.law.curve, cable.Curve)
         for end in ("frame_a", "frame_b"):
             check_frame("AddCables", f"{key}.{end}", plant, getattr(one, end))
         check_type("AddCables", f"{key}.rings", one.rings, tuple, list)
@@ -317,19 +332,16 @@ def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
 def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
-    """Records (cables,) of dtype laws.cable.CABLE: nodes, signal and constants of each cable.
+    """Records (cables,) of laws.cable.cable_type(): nodes, signal and constants of each cable.
 
     `actuated` has the names of the cables that each signal drives; see AddCables().
 
     Raises InputError if `actuated` has an unknown cable, or a cable twice.
     """
     places = {one.name: place for place, one in enumerate(cables)}
-    table = np.zeros(len(cables), dtype=cable.CABLE)
-    table["node_a"] = [nodes.of_frame[one.frame_a.index()] for one in cables]
-    table["node_b"] = [nodes.of_frame[one.frame_b.index()] for one in cables]
-    table["signal"] = cable.PASSIVE
-    for constant in cable.CableLaw._fields:
-        table[constant] = [getattr(one.law, constant) for one in cables]
+    node_a = [nodes.of_frame[one.frame_a.index()] for one in cables]
+    node_b = [nodes.of_frame[one.frame_b.index()] for one in cables]
+    table = cable.CableLaw.put([one.law for one in cables], node_a, node_b)
     for signal, (group, driven) in enumerate(actuated.items()):
         key = f"actuated.{group}"
         check_type("AddCables", key, driven, list, tuple)
