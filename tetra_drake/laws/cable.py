@@ -64,11 +64,48 @@ class Curve(NamedTuple):
         """The curve of one cable from its pieces (pieces, 5)."""
         return cls(np.array(rows, dtype=float).reshape(-1, 5), 0, len(rows))
 
+    @classmethod
+    def of_spring(
+        cls,
+        stiffness: float,
+        *,
+        initial_tension: float = 0.0,
+        quadratic: float = 0.0,
+        cubic: float = 0.0,
+        table: Sequence[tuple[float, float]] = (),
+    ) -> Self:
+        """The curve of a spring with the tension F0 + k x + a x² + b x³, or F0 + a table.
+
+        Args:
+            stiffness: k, in N/m; not used with a table.
+            initial_tension: F0, in N. Below it the coils touch: the spring is CLOSED times as
+                stiff.
+            quadratic: a, in N/m².
+            cubic: b, in N/m³.
+            table: stretches (m) and tensions (N) without F0, ascending from beyond 0. The tension
+                is straight between them.
+        """
+        points = [(0.0, 0.0), *table]
+        rows = [
+            [x, initial_tension + force, (next_force - force) / (next_x - x), 0.0, 0.0]
+            for (x, force), (next_x, next_force) in itertools.pairwise(points)
+        ]
+        if not table and (initial_tension or quadratic or cubic):
+            rows = [[0.0, initial_tension, stiffness, quadratic, cubic]]
+        if initial_tension:
+            slope = rows[0][2]
+            parting = initial_tension / ((CLOSED - 1.0) * slope)  # where the coils part
+            first = [parting, CLOSED * slope * parting, slope + 2.0 * quadratic * parting]
+            rows[:1] = [[0.0, 0.0, CLOSED * slope, 0.0, 0.0], [*first, quadratic, cubic]]
+        return cls.of(rows)
+
     def scaled(self, factor: float) -> Self:
         """This curve with its tensions multiplied by a factor."""
         return self._replace(rows=self.rows * [1.0, *4 * [factor]])
 
 
+CLOSED = 1000.0
+"""Stiffness of a coil spring whose coils touch, as a multiple of its stiffness beyond."""
 NOWHERE = 1e300
 """Stretch (m) at which unused pieces of curves start."""
 NO_CURVE = Curve.of([])
@@ -98,10 +135,10 @@ class CableLaw(NamedTuple):
     def of(cls, cables: Table) -> Self:
         """Constants of all cables as tables (cables,), from an array (cables,) of a NumPy record
         type of cable_type()."""
-        tables: Any = (cables[name].copy() for name in NUMBERS)
+        tables: Any = {name: cables[name].copy() for name in NUMBERS}
         count, pieces, _ = cables["curve"].shape
         rows = cables["curve"].reshape(-1, 5).copy()
-        return cls(*tables, Curve(rows, pieces * np.arange(count), pieces))
+        return cls(**tables, curve=Curve(rows, pieces * np.arange(count), pieces))
 
     @classmethod
     def put(cls, laws: Sequence[CableLaw], node_a: Any, node_b: Any) -> np.ndarray:

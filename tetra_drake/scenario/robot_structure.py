@@ -28,7 +28,7 @@ from tetra_drake.laws.cable import (
     elastic_tension,
 )
 from tetra_drake.laws.model import WORLD
-from tetra_drake.scenario.blueprint import HOLDS, LONGEST, Blueprint, GivenInertia, cable_numbers
+from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
 from tetra_drake.scenario.structure_graph import (
     Member,
@@ -229,34 +229,19 @@ class CableGroup(CableConstants):
             name: values[place] * getattr(self, name) for name, values in self.factors.items()
         }
         group = self.model_copy(update=own) if own else self
-        stiffness, curve = group._spring(firm)
-        damping, free_length = group.damping, group.free_length
-        law = {"damping": STRING_TIME * stiffness if damping is None else damping}
-        law |= {"stiffness": stiffness} | ({"curve": Curve.of(curve)} if curve else {})
+        stiffness, damping, free_length = group.stiffness or firm, group.damping, group.free_length
+        table: list[tuple[float, float]] = []
+        if self.curve:
+            table = [*zip(self.curve.stretch, self.curve.force, strict=True)]
+            stiffness = table[-1][1] / table[-1][0]
+        more = {name: getattr(self, name) for name in ("initial_tension", "quadratic", "cubic")}
+        curve = Curve.of_spring(stiffness, table=table, **more)
+        law: dict[str, Any] = {"damping": STRING_TIME * stiffness if damping is None else damping}
+        law |= {"stiffness": stiffness} | ({"curve": curve} if curve.pieces else {})
         if free_length is None:
             own_law = CableLaw(**law, free_length=distance)
             free_length = distance - elastic_stretch(group.tension or 0.0, own_law)
         return law | {"free_length": free_length}
-
-    def _spring(self, firm: float) -> tuple[float, list[list[float]]]:
-        """Stiffness (N/m) and pieces of the curve of the spring; see laws.cable.Curve."""
-        k, initial = self.stiffness or firm, self.initial_tension
-        corners = [[0.0, initial, k, self.quadratic, self.cubic]]
-        if self.curve:
-            points = [(0.0, 0.0), *zip(self.curve.stretch, self.curve.force, strict=True)]
-            slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(points)]
-            given = zip(points, slopes, strict=False)
-            corners = [[x, initial + force, slope, 0.0, 0.0] for (x, force), slope in given]
-            k = points[-1][1] / points[-1][0]
-        if not initial:
-            return k, corners if self.curve or self.quadratic or self.cubic else []
-        # The closed coils: a steep piece up to the curve, whose first piece begins where they meet.
-        _, _, slope, square, cube = corners[0]
-        closed = [0.0, 0.0, HOLDS * slope, 0.0, 0.0]
-        parting = initial / ((HOLDS - 1.0) * slope)
-        reached = HOLDS * slope * parting
-        first = [parting, reached, slope + 2 * square * parting, square, cube]
-        return k, [closed, first, *corners[1:]]
 
 
 class BallJoint(Section):

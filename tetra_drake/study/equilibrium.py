@@ -305,8 +305,8 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     cannot touch it, and struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
     allowed = START_DEPTH * structure.scale + robot.weight / robot.scenario.ground.stiffness
-    remarks = sinking_remark(robot), yielding_remark(robot)
-    remarks = *remarks, overload_remark(robot, study.cables["tension"].to_numpy())
+    remarks = [sinking_remark(robot), yielding_remark(robot)]
+    remarks.append(overload_remark(robot, study.cables["tension"].to_numpy()))
     lines = [sentence(told) for told in remarks if told]
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):

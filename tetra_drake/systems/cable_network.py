@@ -140,9 +140,11 @@ class CableNetwork(ConvertibleSystem):
         if curve.pieces and (np.shape(curve.rows) != own.rows.shape or np.isnan(curve.rows).any()):
             problem = f"found {np.shape(curve.rows)} numbers, expected {own.rows.shape}, none NaN"
             raise InputError("SetLaw", "curve", problem)
-        given = zip(cable.NUMBERS, law, strict=False)
-        rows = [numbers_for_each("SetLaw", key, row, count=count, least=0.0) for key, row in given]
-        numbers = _numbers_of(cable.CableLaw(*rows, curve=curve if curve.pieces else own))
+        rows: Any = {
+            key: numbers_for_each("SetLaw", key, getattr(law, key), count=count, least=0.0)
+            for key in cable.NUMBERS
+        }
+        numbers = _numbers_of(cable.CableLaw(**rows, curve=curve if curve.pieces else own))
         context.get_mutable_numeric_parameter(0).SetFromVector(numbers)
 
     def _table(
@@ -191,8 +193,9 @@ def _law_of(constants: np.ndarray, curve: cable.Curve) -> cable.CableLaw:
     """The parameters of a CableNetwork as a CableLaw of arrays (cables,), which share their
     memory, with a curve like `curve`."""
     numbers, rows = np.split(constants, [constants.size - curve.rows.size])
-    fields: Any = np.split(numbers, len(cable.NUMBERS))
-    return cable.CableLaw(*fields, curve=curve._replace(rows=rows.reshape(-1, 5)))
+    fields = np.split(numbers, len(cable.NUMBERS))
+    named: Any = dict(zip(cable.NUMBERS, fields, strict=True))
+    return cable.CableLaw(**named, curve=curve._replace(rows=rows.reshape(-1, 5)))
 
 
 @dataclass(frozen=True)
