@@ -99,6 +99,14 @@ class Curve(NamedTuple):
             rows[:1] = [[0.0, 0.0, CLOSED * slope, 0.0, 0.0], [*first, quadratic, cubic]]
         return cls.of(rows)
 
+    @classmethod
+    def stacked(cls, curves: Sequence[Curve]) -> Self:
+        """The curves of several robots: `first` gets an axis of robots (N, cables)."""
+        rows = np.concatenate([curve.rows for curve in curves])
+        begins = len(curves[0].rows) * np.arange(len(curves))
+        first = begins[:, np.newaxis] + [curve.first for curve in curves]
+        return cls(rows, first, curves[0].pieces)
+
     def scaled(self, factor: float) -> Self:
         """This curve with its tensions multiplied by a factor."""
         return self._replace(rows=self.rows * [1.0, *4 * [factor]])

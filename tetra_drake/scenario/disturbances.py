@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,17 +30,20 @@ class Draw:
     moves: np.ndarray | None = None
     """Displacement of each body at t = 0 (n, 3), in m."""
     terrain_seed: int | None = None
+    sensing_seed: int | None = None
     events: tuple[Event, ...] = ()
     """Events in addition to the scenario's: cables that break."""
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
     """The draw (set of random changes) that a seed, a few integers, gives for the scenario's
-    `disturbances`. Without them it changes nothing. Its factors do not depend on the scenario's
-    numbers."""
-    settings = scenario.disturbances
+    `disturbances` and its `sensing`. Without them it changes nothing. Its factors do not depend on
+    the scenario's numbers."""
+    settings, sensing_seed = scenario.disturbances, None
+    if scenario.sensing is not None:
+        sensing_seed = int(stream(seed, "sensing").integers(2**31))
     if settings is None:
-        return Draw({})
+        return Draw({}, sensing_seed=sensing_seed)
     factors = {}
     for joined, spread in settings.spreads.items():
         factors[joined] = 1.0 + stream(seed, *separate(joined)).uniform(-spread, spread)
@@ -56,13 +60,14 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
         factors=factors,
         moves=reach * moves if reach else None,
         terrain_seed=terrain_seed if hasattr(scenario.terrain, "seed") else None,
+        sensing_seed=sensing_seed,
         events=events,
     )
 
 
 def stream(seed: Sequence[int], *names: str) -> np.random.Generator:
     """Random generator for the disturbance or the tolerance of the scenario keys `names`, or for
-    "start", "terrain" or "cuts". Its numbers do not depend on what else is random."""
+    "start", "terrain", "sensing" or "cuts". Its numbers do not depend on what else is random."""
     digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
     words = np.frombuffer(digest, dtype="<u4")
     return np.random.default_rng(np.random.SeedSequence(list(seed), spawn_key=words.tolist()))
@@ -82,8 +87,11 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
         robot = robot.model_copy(update={"offsets": offsets.tolist()})
     if draw.terrain_seed is not None:
         terrain = terrain.model_copy(update={"seed": draw.terrain_seed})
-    events = [*scenario.events, *draw.events]
-    return changed.with_sections(robot=robot, terrain=terrain, events=events, disturbances=None)
+    sections: dict[str, Any] = {"robot": robot, "terrain": terrain, "disturbances": None}
+    if draw.sensing_seed is not None and scenario.sensing is not None:
+        seed = {"seed": draw.sensing_seed}
+        sections["sensing"] = scenario.sensing.model_copy(update=seed)
+    return changed.with_sections(events=[*scenario.events, *draw.events], **sections)
 
 
 def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:
