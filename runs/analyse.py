@@ -25,6 +25,8 @@ from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import MakeExecutor, evaluate_all, evaluator_of
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
+from tetra_drake.lab.study.robustness import PERCENT, by_gait, robustness
+from tetra_drake.lab.study.statistics import json_rows
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Flat, Rough
 from tetra_drake.machine import available_cores, versions
@@ -38,8 +40,6 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import looks_for_turns, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH
-from tetra_drake.study.robustness import PERCENT, by_gait, robustness
-from tetra_drake.study.statistics import json_rows
 
 SCHEMA = 6
 ANALYSIS = "analysis.json"

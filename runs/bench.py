@@ -35,6 +35,12 @@ from tetra_drake.figures.style import save_figure
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.study.statistics import (
+    interquartile_mean,
+    interval,
+    interval_of_resamples,
+    resampled,
+)
 from tetra_drake.machine import available_cores
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation
@@ -45,12 +51,6 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import parse_yaml
-from tetra_drake.study.statistics import (
-    interquartile_mean,
-    interval,
-    interval_of_resamples,
-    resampled,
-)
 
 HERE = Path(__file__).parent / "bench"
 ENTRIES, FILE = HERE / "entries", HERE / "tasks.yaml"

@@ -28,6 +28,7 @@ from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import rounded
+from tetra_drake.lab.study.equilibrium import EquilibriumStudy, robot_of_file, study_equilibrium
 from tetra_drake.laws.capsules import NoStrutContact
 from tetra_drake.laws.terrain import Nothing
 from tetra_drake.results.result import SimulationResult
@@ -37,7 +38,6 @@ from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import parse_yaml
-from tetra_drake.study.equilibrium import EquilibriumStudy, robot_of_file, study_equilibrium
 
 FOLDER = Path(__file__).parents[1] / "tests" / "data" / "corpus"
 MEASURED, KNOWN, PAGE = FOLDER / "measured.json", FOLDER / "known.yaml", FOLDER / "README.md"

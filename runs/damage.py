@@ -30,11 +30,11 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.style import OKABE_ITO, common_style, save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.study.robustness import default_disturbances
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.study.robustness import default_disturbances
 
 HERE = Path(__file__).parent / "damage"
 WALKER, MAP = HERE.parent / "motors", Path("out/runs/motors-map")

@@ -40,12 +40,17 @@ from tetra_drake.figures.style import LINE_COLOURS, common_style, line_style, sa
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed
 from tetra_drake.lab.predict.predict import interval_text
-from tetra_drake.study.statistics import json_rows
+from tetra_drake.lab.study.statistics import json_rows
 
-NUMBERS = "numbers.json"
-"""File of the numbers that need simulations."""
+NUMBERS, INTERVALS = "numbers.json", "intervals.csv"
+"""Files of the numbers that need simulations, and of the intervals beside measured values."""
 
 # Scores
+
+
+def holds(rows: pandas.DataFrame) -> pandas.Series:
+    """True where an interval holds the measured value."""
+    return rows["measured"].between(rows["low"], rows["high"])
 
 
 class Score(NamedTuple):
@@ -63,11 +68,12 @@ class Score(NamedTuple):
     def of(cls, rows: pandas.DataFrame) -> Score:
         """Score of rows with a median, an interval and a measured value."""
         error, half = rows["median"] - rows["measured"], (rows["high"] - rows["low"]) / 2.0
-        inside = (rows["low"] <= rows["measured"]) & (rows["measured"] <= rows["high"])
         text = percent((error / rows["measured"]).abs().median(), 1)
         if (rows["kind"] == "shape").all():
             text = f"{fixed(error.abs().median(), 1)} mm"
-        return cls(len(rows), int(inside.sum()), text, float(np.sqrt(((error / half) ** 2).mean())))
+        return cls(
+            len(rows), int(holds(rows).sum()), text, float(np.sqrt(((error / half) ** 2).mean()))
+        )
 
 
 def totals(rows: pandas.DataFrame, by: str) -> dict[str, Score]:
@@ -193,9 +199,10 @@ def measured_rows() -> dict[str, pandas.DataFrame]:
     anew = pandas.concat([rows for name, rows in found.items() if name.startswith("anew_")])
     known = pandas.concat([rows for name, rows in found.items() if name in KNOWN])
     rows = {**found, "known": known, "blind": blind, "anew": anew}
-    return {
+    rows = {
         name: each[each["measured"].notna()].reset_index(drop=True) for name, each in rows.items()
     }
+    return {name: each.assign(inside=holds(each)) for name, each in rows.items()}
 
 
 KNOWN = ("simplex_loads", "simplex_frequencies", "spine", "jumps")
@@ -233,6 +240,12 @@ def shortened(shares: object) -> str:
     return re.sub(r"(, robot\.[^,;% ]+)+", " and others", text).replace("robot.", "")
 
 
+def table(rows: pandas.DataFrame) -> str:
+    """Intervals beside measured values as CSV."""
+    columns = ["structure", "quantity", "unit", "median", "low", "high", "measured", "inside"]
+    return str(rows[[*columns, "mostly from"]].to_csv(index=False, float_format="%.6g"))
+
+
 def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> str:
     """Text of the page from of_simulations() and measured_rows()."""
     blind, kinds = rows["blind"], ["structure", "kind"]
@@ -267,6 +280,7 @@ def main(out: Path = HERE) -> None:
         save_figure(figure, out, name, kinds=["svg"])
     simulated = of_simulations(under_load, poses, jumps)
     write_whole(out / NUMBERS, json.dumps(simulated, indent=1) + "\n")
+    write_whole(out / INTERVALS, table(rows["known"]))
     write_whole(out / "README.md", page(simulated, rows))
     print(out / "README.md")
 

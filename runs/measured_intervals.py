@@ -39,6 +39,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_json, read_text, write_whole
 from tetra_drake.lab.predict.predict import drawn_scenarios, errors_of, intervals
 from tetra_drake.lab.predict.variates import Variate, variates_of
+from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
@@ -46,7 +47,6 @@ from tetra_drake.robot.struts import axial_forces
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario, scenario_of
 from tetra_drake.scenario.yaml_text import parse_yaml
-from tetra_drake.study.equilibrium import study_equilibrium
 
 KEPT = HERE / "predictions"
 """Folder of the finished cases. A case whose file is there is not computed again."""

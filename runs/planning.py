@@ -45,6 +45,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.experiment import evolve
 from tetra_drake.lab.planner import Planner
 from tetra_drake.lab.prototype.export import COMMAND, export
+from tetra_drake.lab.study.robustness import default_disturbances
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.command_file import load_command
@@ -52,7 +53,6 @@ from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.study.robustness import default_disturbances
 
 PLANNING: Mapping[str, Any] = EPISODES["planner"]
 """Arguments of the planner."""

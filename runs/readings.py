@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -27,11 +27,11 @@ from tetra_drake.experiment import evolve
 from tetra_drake.files import check_file, read_json, read_text, write_whole
 from tetra_drake.formatting import listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.lab.study.statistics import interval, interval_of_resamples, resampled
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
 from tetra_drake.scenario.yaml_text import parse_yaml
-from tetra_drake.study.statistics import interval, interval_of_resamples, resampled
 
 HERE = Path(__file__).parent
 RECORD = HERE / "thesis" / "readings.json"
@@ -163,13 +163,11 @@ def results(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> dict[s
     }
 
 
-def factor(
-    trials: pandas.DataFrame, keys: Iterable[str] = THESIS, drawn: np.ndarray | None = None
-) -> np.ndarray:
+def factor(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> np.ndarray:
     """Factor (...) by which our results differ from THESIS: the exponential of the root mean square
     of the logarithms of their ratios. `drawn` is as for results()."""
     ours = results(trials, drawn)
-    ratios = [np.maximum(ours[key], 1e-3) / THESIS[key] for key in keys]
+    ratios = [np.maximum(ours[key], 1e-3) / THESIS[key] for key in THESIS]
     return np.asarray(np.exp(np.sqrt(np.mean(np.square(np.log(ratios)), axis=0))))
 
 

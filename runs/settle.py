@@ -16,8 +16,8 @@ from analyse import Analysis, load_analysis
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, ranged
+from tetra_drake.lab.study.statistics import interval_of_resamples, resampled
 from tetra_drake.settings.units import INCH
-from tetra_drake.study.statistics import interval_of_resamples, resampled
 
 
 def numbers(analysis: Analysis) -> dict[str, np.ndarray]:

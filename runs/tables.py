@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas
-from analyse import DRAWN, MUJOCO, SHOWN, SPEED, TIGHT, TURNED, Analysis, load_analysis
+from analyse import DRAWN, MUJOCO, SPEED, TIGHT, TURNED, Analysis, load_analysis
 from page import rendered
 from parting import partings
 from PIL import Image
@@ -34,7 +34,7 @@ from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import fixed, rounded, uncertain
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
-from tetra_drake.scenario.metrics import UNITS, looks_for_turns
+from tetra_drake.scenario.metrics import looks_for_turns
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH, Units
 
@@ -228,22 +228,19 @@ def results_table(runs: Runs) -> str:
 def trials_table(name: str, runs: Runs) -> str:
     """Table of the fittest gait of each trial of a run, on all engines and on disturbed robots.
     Below it, the trials with different distances on the engines."""
-    run, units = runs[name], scenario_of(name).units
-    metrics, rows = {name: units.of(UNITS[name]) for name in SHOWN}, []
+    run, units, rows = runs[name], scenario_of(name).units, []
     for trial, gait in run.best_gaits.iterrows():
         judged, (compiled, diagram, mujoco) = run.disturbed.loc[trial], distances_of(run, trial)
         row = {
             "trial": trial,
-            "gait": gait,
-            "distances": np.array([compiled, diagram, mujoco, judged["mean"]]) / units.length,
+            "distances": np.array([compiled, diagram, mujoco]) / units.length,
             "kept": 100.0 * judged[["kept", "kept_low", "kept_high"]].to_numpy(),
-            "metrics": [gait[name] / size for name, (size, _) in metrics.items()],
+            "cost": gait["cost_of_transport"],
             "is_apart": not abs(compiled - diagram) <= APART,
         }
         rows.append(row)
-    by_name = {name.replace("_", " "): unit for name, (_, unit) in metrics.items()}
     apart_by = f"{rounded(APART / units.length, 1)} {units.length_word}"
-    return rendered("trials.md", rows=rows, units=units, metrics=by_name, apart_by=apart_by)
+    return rendered("trials.md", rows=rows, units=units, apart_by=apart_by)
 
 
 def partings_table(name: str, other: str) -> str:

@@ -20,7 +20,7 @@ ROWS = [
     ["errors", "files", "formatting", "interrupts", "machine", "on_demand"],
     ["kernels", "settings", "laws", "scenario", "options", "robot"],
     ["systems", "visualization", "results", "engines"],
-    ["optimizers", "evolution", "figures", "study", "report", "experiment"],
+    ["optimizers", "evolution", "figures", "report", "experiment"],
     ["command_options", "cli", "lab", "gym"],
 ]
 ORDER = [name for row in ROWS for name in row]

@@ -21,10 +21,10 @@ from tetra_drake.lab.fit.fit import fit
 from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.lab.linearization.linearization import linearize
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.study.sweep import sweep
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
-from tetra_drake.study.sweep import sweep
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 ROWS = yaml.safe_load(Path(__file__).with_name("refused_calls.yaml").read_text("utf-8"))

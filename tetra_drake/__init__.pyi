@@ -17,14 +17,14 @@ from tetra_drake.lab.planner import Planner as Planner
 from tetra_drake.lab.predict.predict import predict as predict
 from tetra_drake.lab.prototype.export import export as export
 from tetra_drake.lab.spread import spread as spread
+from tetra_drake.lab.study.equilibrium import study_equilibrium as study_equilibrium
+from tetra_drake.lab.study.robustness import robustness as robustness
+from tetra_drake.lab.study.sweep import sweep as sweep
 from tetra_drake.report.result_folder import load_result as load_result
 from tetra_drake.robot.command_file import load_command as load_command
 from tetra_drake.robot.gait_file import load_gait as load_gait
 from tetra_drake.robot.parameter_space import ParameterSpace as ParameterSpace
 from tetra_drake.robot.parameter_space import seeded_gait as seeded_gait
 from tetra_drake.scenario.load import load_scenario as load_scenario
-from tetra_drake.study.equilibrium import study_equilibrium as study_equilibrium
-from tetra_drake.study.robustness import robustness as robustness
-from tetra_drake.study.sweep import sweep as sweep
 
 __version__: str

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from scipy.io import loadmat
 
 from tetra_drake.lab.gym.picture import picture
+from tetra_drake.lab.study.equilibrium import robot_of_file, structure_text, study_equilibrium
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.study.equilibrium import robot_of_file, structure_text, study_equilibrium
 
 matrices = loadmat(Path(__file__).parent / "tower.mat")  # or numpy.loadtxt() for a CSV file
 

@@ -135,7 +135,8 @@ def rows() -> Iterable[Any]:
     changes = {"cpg": "!Phase {gain: 2 N, start_up: 0 s}", "friction": COULOMB}
     changes["cpg.feedback"] = list(PATHWAYS)
     within = {"p_WN": 1e-6, "signal": 2e-5}
-    yield row("phase oscillators", "thesis", 0.15, changes, CONVERGE, within, drive, 1e-4)
+    cells = "thesis", 0.15, changes, CONVERGE, within, drive, 1e-4
+    yield row("phase oscillators", *cells, slow=True)  # compiles the stepping kernel
     for signals in ("listing", "live"):
         changes = {"cpg.signals": signals, "cpg.listing_step": "1e-4 s", "gait_bounds.turn": 0.0}
         name = f"steering, {signals}"
@@ -230,12 +231,18 @@ def rows() -> Iterable[Any]:
     # Bodies, cables and motors are the same; only the ground differs.
     within = {"p_WN": 3e-8, "v_WN": 6e-6, "p_WB": 3e-8, "q_WB": 2e-7}
     within |= {"length": 6e-8, "tension": 6e-5, "signal": 1e-9}
-    for count in (2, 5, 8):
-        changes = {"robot.tetrahedra": count, "robot.gravity": 0.0, "cpg.start_up": "0.105 s"}
-        changes |= {"cpg.signals": "listing"}
+    network = {"cpg.signals": "listing", "cpg.start_up": "0.105 s"}
+    phases = {"cpg": "!Phase {gain: 2 lbf, start_up: 0.105 s, signals: listing}"}
+    for count, cpg, other in (
+        (2, network, FINE[0]),
+        (5, network, FINE[0]),
+        (8, network, FINE[0]),
+        (3, phases, CONVERGE[1]),
+    ):
+        changes = {"robot.tetrahedra": count, "robot.gravity": 0.0}
         changes |= {"robot.offsets": [[0.0, 0.0, "1 m"]] * count}
-        engines, name = (FINE[0], Limit(4e-5)), f"{count} tetrahedra in the air, MuJoCo"
-        yield row(name, "thesis", 0.2, changes, engines, within, gait(), 1e-3)
+        engines, name = (other, Limit(4e-5)), f"{count} tetrahedra in the air, MuJoCo"
+        yield row(name, "thesis", 0.2, changes | cpg, engines, within, gait(), 1e-3)
     # The damping of the normal force differs, so that the robot lands a little differently.
     changes = {"terrain": UNEVEN["incline"], "friction": COULOMB, "cpg.start_up": "0.105 s"}
     engines = Compiled(), Mujoco()

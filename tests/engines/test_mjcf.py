@@ -11,8 +11,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.lab.bridges.sdf import make_sdf
+from tetra_drake.lab.study.equilibrium import EquilibriumStudy, robot_of_file, study_equilibrium
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.study.equilibrium import EquilibriumStudy, robot_of_file, study_equilibrium
 from tetra_drake.systems import AddCables
 from tetra_drake.systems.diagram import cables_of
 

@@ -16,6 +16,8 @@ from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import in_lanes
 from tetra_drake.evolution.trials import BEST_SCENARIO
 from tetra_drake.experiment import evolve
+from tetra_drake.lab.study.robustness import robustness
+from tetra_drake.lab.study.sweep import sweep
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait_file import load_gait
@@ -23,8 +25,6 @@ from tetra_drake.robot.parameter_space import ParameterSpace, seeded_gait, with_
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState
-from tetra_drake.study.robustness import robustness
-from tetra_drake.study.sweep import sweep
 
 SIDE, UPPER = "robot.cables.side.stiffness", "robot.nodes.n3[2], robot.nodes.n4[2]"
 BODY = {SIDE: ["50 N/m", "0.4 kN/m"], "friction.kinetic": [0.4, 0.5], UPPER: ["15 cm", "17 cm"]}

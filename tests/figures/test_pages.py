@@ -28,7 +28,7 @@ from tetra_drake.figures.motion import (
 from tetra_drake.figures.style import common_style
 from tetra_drake.lab.comparison import compare, comparison
 from tetra_drake.lab.elites.elites import map_of_gaits
-from tetra_drake.study.robustness import robustness_figure
+from tetra_drake.lab.study.robustness import robustness_figure
 
 OF_A_GAIT = [gait_diagram, relative_distances, time_lapse, path_of_the_centre, one_step]
 OF_A_GAIT += [signals_and_tensions, ground_forces]

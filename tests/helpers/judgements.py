@@ -4,8 +4,8 @@ import numpy as np
 import pandas
 
 from helpers.synthetic_run import tiny_scenario
+from tetra_drake.lab.study.robustness import START, Judgement
 from tetra_drake.scenario.experiment_sections import Disturbances
-from tetra_drake.study.robustness import START, Judgement
 
 
 def judgement_by_hand() -> Judgement:

@@ -9,8 +9,8 @@ from tetra_drake.evolution.entries import EliteLine
 from tetra_drake.evolution.run import load_run
 from tetra_drake.lab.elites.elites import CELLS, elites, judge_elites, kept_gaits, notable_gaits
 from tetra_drake.lab.elites.quality_diversity import FLOOR
+from tetra_drake.lab.study.robustness import Judgement
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.study.robustness import Judgement
 
 KIND = QualityDiversity(measures={"speed": [0.0, 0.1], "lifted": [0.2, 0.8]}, cells=[5, 4], draws=2)
 

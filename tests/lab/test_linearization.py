@@ -23,6 +23,7 @@ from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
 from tetra_drake.lab.linearization.linearization import Linearization, linearize
 from tetra_drake.lab.linearization.rates import rates_and_forces
+from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.readings import first_readings
@@ -30,7 +31,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.systems import SampledController
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 

@@ -14,11 +14,11 @@ from helpers.structures import joined_nodes
 from tetra_drake.errors import InputError
 from tetra_drake.lab.bridges.conversion import converted
 from tetra_drake.lab.bridges.ntrt import ntrt_tree
+from tetra_drake.lab.study.equilibrium import robot_of_structure
 from tetra_drake.robot.statics import find_statics
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario, save_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.study.equilibrium import robot_of_structure
 
 TEXTS = {file.stem: file.read_text("utf-8") for file in (DATA / "ntrt").glob("*.yaml")}
 ROWS = yaml.safe_load(Path(__file__).with_name("ntrt.yaml").read_text("utf-8"))

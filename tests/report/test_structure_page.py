@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from tetra_drake.lab.study.equilibrium import robot_of_file, structure_text, study_equilibrium
 from tetra_drake.report.summary import result_text
 from tetra_drake.robot.remarks import sinking_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.study.equilibrium import robot_of_file, structure_text, study_equilibrium
 
 BEAM = """
 unit: m

@@ -7,11 +7,11 @@ import pytest
 from helpers.anchored import BAR, HUNG, SWINGING, scenario_of, supported_prism
 from helpers.joined import DOUBLE, RHOMBUS
 
+from tetra_drake.lab.study.equilibrium import structure_text, study_equilibrium
 from tetra_drake.robot.remarks import yielding_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.study.equilibrium import structure_text, study_equilibrium
 
 G = 9.80665
 TENSION, SIZE, SPREAD = 2e4, 10.0, 6.0

@@ -11,6 +11,7 @@ from helpers import joined
 from helpers.anchored import BAR, HUNG, SWINGING, floating_prism, scenario_of, supported_prism
 
 from tetra_drake.kernels.packed import Packed
+from tetra_drake.lab.study.equilibrium import robot_of_file
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.capsules import find_touch
 from tetra_drake.laws.forces import Forces, compute_state_forces
@@ -27,7 +28,6 @@ from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
 from tetra_drake.robot.struts import overlaps
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure
-from tetra_drake.study.equilibrium import robot_of_file
 
 G = 9.80665
 TOUCHING = {"strut_contact": "!HuntCrossley {stiffness: 1 MN/m, dissipation: 1 s/m}"}

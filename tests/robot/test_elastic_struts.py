@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from helpers.anchored import scenario_of
 
+from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.robot.robot import Robot
-from tetra_drake.study.equilibrium import study_equilibrium
 
 G, MASS, LOAD = 9.80665, 2.0, 500.0
 SOFT, HARD = 1e5, 1e6

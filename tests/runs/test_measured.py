@@ -88,7 +88,9 @@ def test_the_blind_predictions_are_as_they_were_committed():
 
 def test_the_page_shows_its_records():
     numbers = json.loads((measured.HERE / measured.NUMBERS).read_text(encoding="utf-8"))
-    assert measured.page(numbers, measured.measured_rows()) == PAGE
+    rows = measured.measured_rows()
+    assert measured.page(numbers, rows) == PAGE
+    assert measured.table(rows["known"]) == (measured.HERE / measured.INTERVALS).read_text()
 
 
 def test_blind_forces_hold_and_blind_heights_do_not_until_the_supports_stay_in_place():

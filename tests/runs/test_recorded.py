@@ -17,6 +17,7 @@ from helpers.recorded import recorded_run
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.lab.elites.elites import elites
+from tetra_drake.lab.study.robustness import DRAWS
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.robot.gait_file import load_gait
@@ -24,7 +25,6 @@ from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
-from tetra_drake.study.robustness import DRAWS
 
 DRAKE = "`!Drake {}`"
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]

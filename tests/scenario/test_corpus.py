@@ -5,9 +5,9 @@ import json
 import corpus
 import pytest
 
+from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import parse_yaml
-from tetra_drake.study.equilibrium import study_equilibrium
 
 ROWS = json.loads(corpus.MEASURED.read_text(encoding="utf-8"))
 

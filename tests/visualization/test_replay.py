@@ -16,6 +16,7 @@ from helpers.meshcat_page import commands, read_page
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.films.browser import do, wait_until_loaded
 from tetra_drake.lab.films.video import encode, make_video
+from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.laws.terrain import Incline
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -23,7 +24,6 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.settings.units import INCH, POUND_FORCE
-from tetra_drake.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.visualization.replay import (
     RESOLUTION,
     frame_samples,

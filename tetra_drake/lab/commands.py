@@ -14,6 +14,7 @@ from tetra_drake.command_options import (
     Folder,
     FontSize,
     FrameRate,
+    GaitOrRun,
     GaitPath,
     GaitSeed,
     Labels,
@@ -27,6 +28,7 @@ from tetra_drake.command_options import (
     Seed,
     Size,
     StructureName,
+    UnitName,
     View,
     Width,
     print_of,
@@ -34,8 +36,119 @@ from tetra_drake.command_options import (
     scenario_and_gait,
     warn,
 )
-from tetra_drake.files import check_folder, file_names
+from tetra_drake.errors import InputError
+from tetra_drake.files import check_folder, file_names, write_whole
 from tetra_drake.settings.units import INCH
+
+
+def _robustness(
+    source: GaitOrRun,
+    *,
+    scenario: ScenarioName | None = None,
+    draws: Count = 200,
+    seed: Seed = 0,
+    workers: Count | None = None,
+    out: Folder | None = None,
+) -> None:
+    """Test gaits under disturbances that were not used in evolution.
+
+    Simulates a gait, or the best gait of each trial of a run, on the compiled engine: undisturbed,
+    in random draws of the scenario's disturbances (5 percent if it has none), and with each
+    disturbance alone. Prints how far it walks, in how many draws it is robust (loses at most a
+    tenth of its undisturbed distance), and which disturbance hurts most.
+
+    Args:
+        source: a gait file, or a folder written by `evolve`
+        scenario: (default: the scenario of the gait's run; thesis for a gait in no run)
+        draws: number of draws (default: %(default)s)
+        seed: random seed of the draws (default: %(default)s)
+        workers: worker processes (default: one per core)
+        out: write tables (CSV, JSON) and the figure into this folder
+
+    Example: tetra-drake robustness runs/thesis --draws 50 --out robustness
+    """
+    from tetra_drake.evolution.run import load_source
+    from tetra_drake.lab.study.robustness import robustness, robustness_text, save_judgement
+
+    found = load_source(source, scenario=scenario, warn=warn)
+    if out:
+        check_folder(out)
+    judgement = robustness(found.scenario, found.gaits, draws=draws, seed=seed, workers=workers)
+    print(robustness_text(judgement))
+    if out:
+        print(f"wrote {', '.join(save_judgement(judgement, out))} to {out}/")
+
+
+def _structure(
+    source: StructureName,
+    *,
+    unit: UnitName | None = None,
+    without: Labels | None = None,
+    out: File | None = None,
+    mode: Count | None = None,
+    mjcf: File | None = None,
+    sdf: File | None = None,
+) -> None:
+    """Analyse a structure and its equilibrium.
+
+    Reads a structure file, one of NTRT, an MJCF file (.xml) with tendons, or the robot of a
+    scenario, and computes its equilibrium on flat ground without actuation. Prints bodies, cables,
+    states of self-stress, infinitesimal mechanisms, natural frequencies, damping ratios, tensions
+    and heights.
+
+    Args:
+        unit: unit of length of the file's bare coordinates, such as dm; files of NTRT need it
+        without: bodies of an MJCF file to leave out
+        out: write an HTML page that shows the structure in equilibrium; a name that ends in .yaml
+            writes a structure file instead, such as one converted from MJCF
+        mode: show in --out only the mode with damping that has this number
+        mjcf: write a model for MuJoCo, with tendons, motors and the key frame `rest`
+        sdf: write a model in SDFormat: bodies, and nodes as frames, without cables
+
+    Example: tetra-drake structure six_bar --out six_bar.html
+    """
+    from tetra_drake.engines.mjcf import loose_remark, make_mjcf
+    from tetra_drake.lab.bridges.conversion import converted
+    from tetra_drake.lab.bridges.sdf import make_sdf
+    from tetra_drake.lab.study.equilibrium import (
+        robot_of_file,
+        robot_of_structure,
+        save_structure_page,
+        structure_text,
+        study_equilibrium,
+    )
+    from tetra_drake.scenario.structure_files import (
+        foreign_format,
+        read_structure,
+        save_structure,
+    )
+
+    if mode is not None and (out is None or out.suffix in (".yaml", ".yml")):
+        raise InputError("structure", "--mode", "needs --out, a page")
+    structure = None
+    if foreign_format(source) or without:
+        structure = converted(Path(source), unit=unit, without=without or ())
+    if out and out.suffix in (".yaml", ".yml"):
+        structure = structure or read_structure(source, unit=unit)
+        save_structure(structure, out, source=source)
+        say(f"wrote {out}")
+        source, out = str(out), None
+    whole = robot_of_structure(structure, source) if structure else robot_of_file(source, unit=unit)
+    study = study_equilibrium(whole)
+    text, robot = structure_text(study), study.robot
+    rest = robot.equilibrium.state
+    if out:
+        save_structure_page(study, out, mode=mode)
+        text += f"\nto see the structure, open in a browser: {out}"
+    if mjcf:
+        write_whole(mjcf, make_mjcf(robot, rest=rest))
+        text += f"\nwrote {mjcf}"
+        if remark := loose_remark(robot):
+            warn(remark)
+    if sdf:
+        write_whole(sdf, make_sdf(robot.structure, rest, name=robot.scenario.name))
+        text += f"\nwrote {sdf}"
+    print(text)
 
 
 def _export(
@@ -233,11 +346,11 @@ def _predict(
     Example: tetra-drake predict my.yaml --quantities 'n3 z' --out out
     """
     from tetra_drake.lab.predict.predict import predict
+    from tetra_drake.lab.study.equilibrium import robot_of_file
     from tetra_drake.robot.command_file import load_command
     from tetra_drake.scenario.load import load_scenario
     from tetra_drake.scenario.scenario import scenario_of
     from tetra_drake.scenario.structure_files import names_scenario
-    from tetra_drake.study.equilibrium import robot_of_file
 
     is_scenario = names_scenario(source)
     scenario = load_scenario(source) if is_scenario else scenario_of(robot_of_file(source).scenario)
@@ -252,5 +365,5 @@ def _predict(
         print(f"to see the predictions, open in a browser: {out / 'predict.html'}")
 
 
-COMMANDS = (_export, _video, _compare, _fit, _predict)
+COMMANDS = (_robustness, _structure, _export, _video, _compare, _fit, _predict)
 """Functions of the commands, for the command line."""

@@ -38,15 +38,15 @@ from tetra_drake.figures.style import (
     titled,
 )
 from tetra_drake.formatting import TextTable, fixed, ranged, rounded
-from tetra_drake.scenario.metrics import UNITS, inverse
-from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.study.statistics import (
+from tetra_drake.lab.study.statistics import (
     interquartile_mean,
     interval,
     interval_of_resamples,
     json_rows,
     resampled,
 )
+from tetra_drake.scenario.metrics import UNITS, inverse
+from tetra_drake.scenario.scenario import Scenario
 
 _FIRST = 10  # simulations; the axes of costs begin here
 _BESIDE = 5.5  # least width (in) of two panels side by side, with letters of the usual size

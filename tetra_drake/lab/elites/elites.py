@@ -22,9 +22,9 @@ from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_o
 from tetra_drake.files import json_number
 from tetra_drake.formatting import listed
 from tetra_drake.lab.elites.quality_diversity import FLOOR
+from tetra_drake.lab.study.robustness import by_gait, robustness
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.study.robustness import by_gait, robustness
 
 LUCKY = 0.5
 """Least share `kept` of draws for a robust elite; see robustness.LOSS. An elite with less is left

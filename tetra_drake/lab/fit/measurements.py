@@ -22,6 +22,7 @@ from tetra_drake.engines.simulate import Outcome, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import read_bytes, read_text
 from tetra_drake.formatting import fixed
+from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.model import WORLD
 from tetra_drake.robot.command import Command, Driver
@@ -45,7 +46,6 @@ from tetra_drake.settings.quantities import (
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Kinds, Section, keys_of
 from tetra_drake.settings.units import given_quantity
-from tetra_drake.study.equilibrium import study_equilibrium
 
 SAMPLE_PERIOD = 5e-3
 """Time (s) between samples of simulated motion. Cubic curves join the samples."""

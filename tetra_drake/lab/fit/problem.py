@@ -18,12 +18,12 @@ from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say
 from tetra_drake.lab.fit.measurements import Measured
 from tetra_drake.lab.predict.variates import variates_of
+from tetra_drake.lab.study.sweep import with_joined_changes
 from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.quantities import Quantity
 from tetra_drake.settings.section import Tree, value_at
 from tetra_drake.settings.units import given_quantity
-from tetra_drake.study.sweep import with_joined_changes
 
 STEP = 1e-3
 """Step of finite differences, as a share of a parameter's start. With less, the contact's kinks and

@@ -37,6 +37,8 @@ from tetra_drake.files import given_path
 from tetra_drake.formatting import TextTable, fixed, rounded
 from tetra_drake.lab.page import write_page
 from tetra_drake.lab.predict.variates import Variate, variates_of
+from tetra_drake.lab.study.equilibrium import EquilibriumStudy, study_equilibrium
+from tetra_drake.lab.study.statistics import json_rows
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, Driver
@@ -51,8 +53,6 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.quantities import Quantity
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import value_at
-from tetra_drake.study.equilibrium import EquilibriumStudy, study_equilibrium
-from tetra_drake.study.statistics import json_rows
 
 DRAWS = 200
 LOW, HIGH = 0.05, 0.95

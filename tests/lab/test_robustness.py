@@ -11,14 +11,14 @@ from helpers.synthetic_run import tiny_scenario
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.lab.study import robustness
+from tetra_drake.lab.study.robustness import robustness_text
+from tetra_drake.lab.study.statistics import share_interval
 from tetra_drake.robot.gait_file import save_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws, fresh_seed
 from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.study import robustness
-from tetra_drake.study.robustness import robustness_text
-from tetra_drake.study.statistics import share_interval
 
 DRAWS = 3
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas
 import pytest
 
-from tetra_drake.study.statistics import interquartile_mean, interval, share_interval
+from tetra_drake.lab.study.statistics import interquartile_mean, interval, share_interval
 
 
 def test_the_bootstrap_interval_is_that_of_the_mean_of_many_numbers():

@@ -9,13 +9,13 @@ from helpers.anchored import HUNG, scenario_of
 from helpers.converged import shortly
 
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.lab.study.sweep import sweep
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.robot.gait_file import save_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.study.sweep import sweep
 
 STIFFNESS = "robot.cables.outer_stiffness"
 

@@ -10,18 +10,18 @@ from helpers import joined
 from helpers.anchored import TREES, scenario_of
 from helpers.meshcat_page import read_page
 
-from tetra_drake.laws.terrain import Flat
-from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.settings.units import shown_in
-from tetra_drake.study import equilibrium
-from tetra_drake.study.equilibrium import (
+from tetra_drake.lab.study import equilibrium
+from tetra_drake.lab.study.equilibrium import (
     robot_of_file,
     save_structure_page,
     structure_text,
     study_equilibrium,
 )
+from tetra_drake.laws.terrain import Flat
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.settings.units import shown_in
 
 
 def on_ground(nodes, bars, **groups):

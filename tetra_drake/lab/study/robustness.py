@@ -33,6 +33,7 @@ from tetra_drake.figures.style import (
     write_beside,
 )
 from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
+from tetra_drake.lab.study.statistics import interval, json_rows, share_interval
 from tetra_drake.machine import versions
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
@@ -44,7 +45,6 @@ from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import varied, written
-from tetra_drake.study.statistics import interval, json_rows, share_interval
 
 NOTHING, ALL = "nothing", "all"
 START, TERRAIN, CUTS = "displaced start", "terrain seed", "cut cables"
