@@ -6,13 +6,13 @@ from helpers.anchored import scenario_of
 from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.laws.cable import CableLaw, elastic_energy, elastic_stretch, elastic_tension
 from tetra_drake.report.summary import result_text
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.study.equilibrium import study_equilibrium
 
 G, MASS, FREE = 9.80665, 0.5, 0.1
 SPRINGS = {

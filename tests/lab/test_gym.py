@@ -70,6 +70,9 @@ def test_an_action_is_the_signal_as_a_share_of_the_networks(short, actuation):
     setpoints = env._episodes._setpoints(np.array([[0.0, 1.0, -1.0, 0.0]]))[0]
     rest = env._episodes._setpoints(np.zeros((1, 4)))[0]
     np.testing.assert_allclose(setpoints - rest, amplitude * shifts * per_newton, rtol=1e-9)
+    if actuation is not MOTOR:  # which does not push
+        beyond = env._episodes._setpoints(np.array([[0.0, 2.0, -2.0, 0.0]]))[0]
+        np.testing.assert_allclose(beyond - rest, 2.0 * (setpoints - rest), rtol=1e-9)
 
 
 def test_observations_are_what_sensors_show_and_rewards_are_exact(short):

@@ -46,10 +46,6 @@ _UNDISTURBED = json.dumps({"seed": None, "damage": []})
 """Identity of a robot without disturbances and damage; see Simulation._robot_of()."""
 
 
-_RECENT = "sensors."
-"""Beginning of the names of the states of sensors."""
-
-
 class Simulation:
     """Robots side by side that a program controls: it reads them and sets their actuators. The
     compiled engine simulates them.
@@ -184,8 +180,7 @@ class Simulation:
 
         with self._used("reset", is_whole=self._is_whole or len(set(places)) == self.count):
             identities = [_UNDISTURBED] * len(places)
-            is_random = self.scenario.disturbances or self.scenario.sensing
-            if seed is not None and is_random:
+            if seed is not None and (self.scenario.disturbances or self.scenario.sensing):
                 numbers_of_robots = [0] * len(places) if is_list(seed) else places
                 seeds = zip(given, numbers_of_robots, strict=True)
                 identities = [json.dumps({"seed": each, "damage": []}) for each in seeds]
@@ -283,7 +278,7 @@ class Simulation:
             recent = [self._sensors[place].recent for place in which if self._sensors]
             for name in Readings._fields if recent else ():
                 rows = [[getattr(readings, name) for readings in own] for own in recent]
-                tables[f"{_RECENT}{name}"] = np.array(rows)
+                tables[f"sensors.{name}"] = np.array(rows)
             return States(
                 scenario=self.scenario.name,
                 identity=self._identity,
@@ -339,9 +334,9 @@ class Simulation:
             self._batch.restore(which, own)
             for row, place in enumerate(which if self._sensors else ()):
                 sensors = Sensors(self._robots[place].scenario, self.control_period)
-                recent = [own[f"{_RECENT}{name}"][row] for name in Readings._fields]
-                sensors.recent = [Readings(*each) for each in zip(*recent, strict=True)]
                 self._sensors[place] = sensors
+                recent = [own[f"sensors.{name}"][row] for name in Readings._fields]
+                sensors.recent = [Readings(*each) for each in zip(*recent, strict=True)]
             self._steps[which] = steps
             self._is_whole = True
             return self._seen()

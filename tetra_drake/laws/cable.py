@@ -22,28 +22,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field
 
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, select
-from tetra_drake.settings.quantities import Damping
-from tetra_drake.settings.section import Section
 
 PASSIVE = -1
 """Value of `signal` for a cable without actuation."""
-
-
-class CableConstants(Section):
-    """Settings of cables that all kinds of robots have in common."""
-
-    damping: Damping = Field(ge=0)
-    """Damping coefficient of a cable: tension divided by the rate of its length."""
-
-    def constants(self, *, stiffness: float, free_length: float) -> dict[str, float]:
-        """Constants of one cable as keyword arguments of CableLaw, in SI units. `stiffness` is in
-        N/m, `free_length` in m."""
-        own = {name: getattr(self, name) for name in CableConstants.model_fields}
-        return own | {"stiffness": stiffness, "free_length": free_length}
 
 
 class Curve(NamedTuple):
@@ -103,9 +87,8 @@ class Curve(NamedTuple):
     def stacked(cls, curves: Sequence[Curve]) -> Self:
         """The curves of several robots: `first` gets an axis of robots (N, cables)."""
         rows = np.concatenate([curve.rows for curve in curves])
-        begins = len(curves[0].rows) * np.arange(len(curves))
-        first = begins[:, np.newaxis] + [curve.first for curve in curves]
-        return cls(rows, first, curves[0].pieces)
+        first = [k * len(curve.rows) + curve.first for k, curve in enumerate(curves)]
+        return cls(rows, np.array(first), curves[0].pieces)
 
     def scaled(self, factor: float) -> Self:
         """This curve with its tensions multiplied by a factor."""
@@ -143,10 +126,10 @@ class CableLaw(NamedTuple):
     def of(cls, cables: Table) -> Self:
         """Constants of all cables as tables (cables,), from an array (cables,) of a NumPy record
         type of cable_type()."""
-        tables: Any = {name: cables[name].copy() for name in NUMBERS}
         count, pieces, _ = cables["curve"].shape
         rows = cables["curve"].reshape(-1, 5).copy()
-        return cls(**tables, curve=Curve(rows, pieces * np.arange(count), pieces))
+        curve = Curve(rows, pieces * np.arange(count), pieces)
+        return cls._make([*(cables[name].copy() for name in NUMBERS), curve])
 
     @classmethod
     def put(cls, laws: Sequence[CableLaw], node_a: Any, node_b: Any) -> np.ndarray:

@@ -110,8 +110,7 @@ def result_text(result: SimulationResult) -> str:
     robot = result.robot
     still = stillness_remark(robot, vars(metrics)) if result.gait else ""
     remarks = [start_up_remark(robot) or still, sinking_remark(robot), yielding_remark(robot)]
-    if result.tally:
-        remarks.append(overload_remark(robot, result.tally.most_tension))
+    remarks += [overload_remark(robot, result.tally.most_tension)] if result.tally else []
     lines += [sentence(remark) for remark in remarks if remark]
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]

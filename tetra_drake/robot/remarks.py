@@ -132,15 +132,12 @@ def yielding_remark(robot: Robot) -> str:
 def overload_remark(robot: Robot, tensions: np.ndarray) -> str:
     """Remark on the cable whose tension, of the greatest `tensions` (cables,) in N, exceeds its
     limit most; see `max_tension` and `max_stretch` of cables. It is "" if none does."""
-    structure, units = robot.structure, robot.scenario.units
-    shares = tensions / structure.cable_limits if structure.cable_limits.size else np.zeros(1)
-    if shares.max(initial=0.0) <= 1.0:
+    limits, units = robot.structure.cable_limits, robot.scenario.units
+    if not limits.size or (tensions <= limits).all():
         return ""
-    most = int(shares.argmax())
-    reached, limit = (units.shown(x[most], "N") for x in (tensions, structure.cable_limits))
-    more = np.count_nonzero(shares > 1.0) - 1
-    others = f", and {more} more cables are overloaded" if more else ""
-    return f"{structure.cable_names[most]} reaches {reached}, its limit is {limit}{others}"
+    most = int((tensions / limits).argmax())
+    reached, limit = (units.shown(x[most], "N") for x in (tensions, limits))
+    return f"{robot.structure.cable_names[most]} reaches {reached}, its limit is {limit}"
 
 
 def _equilibrium(robot: Robot) -> Equilibrium | None:

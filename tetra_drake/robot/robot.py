@@ -118,10 +118,8 @@ class Robot:
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
-                law = laws[number]
-                laws[number] = dict.fromkeys(law, 0.0)
-                if "curve" in law:
-                    laws[number]["curve"] = law["curve"].scaled(0.0)
+                law = laws[number].items()
+                laws[number] = {k: x.scaled(0.0) if k == "curve" else 0.0 for k, x in law}
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),

@@ -12,9 +12,6 @@ from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.sensing import UNITS
 from tetra_drake.scenario.world import World
 
-_SAME = 1e-6
-"""Share of a control period by which a delay may differ from whole periods."""
-
 
 class Sensors:
     """Sensors of a robot, by its scenario's section `sensing`, and what they have yet to show.
@@ -31,7 +28,7 @@ class Sensors:
         self._sensing, self._period, self._lags = scenario.sensing, period, dict[str, int]()
         for name, delay in scenario.sensing.delay.items():
             lag = self._lags[name] = round(delay / period)
-            if abs(delay - lag * period) > _SAME * period:
+            if abs(delay - lag * period) > 1e-6 * period:
                 key = f"sensing.delay.{name}"
                 expected = f"expected a multiple of the control period, {period:g} s"
                 raise InputError(f"scenario {scenario.name}", key, f"found {delay:g} s, {expected}")
@@ -41,7 +38,7 @@ class Sensors:
     def __call__(self, exact: Readings) -> Readings:
         """What the sensors show of a robot's exact readings, which have no axis of robots. Earlier
         readings than the latest ones begin anew, from the start."""
-        step = self._step(exact)
+        step = round(float(exact.time) / self._period)
         if self._lags:
             self._remember(exact.copied(), step)
         seen = {}
@@ -50,17 +47,13 @@ class Sensors:
             seen[name] = self._sensing.seen(name, np.asarray(getattr(late, name)), step=step)
         return exact._replace(**seen)
 
-    def _step(self, readings: Readings) -> int:
-        return round(float(readings.time) / self._period)
-
     def _remember(self, now: Readings, step: int) -> None:
         longest = max(self._lags.values())
-        latest = self._step(self.recent[-1]) if self.recent else math.inf
+        times = [round(float(readings.time) / self._period) for readings in self.recent]
+        latest = max(times, default=math.inf)
         if step == 0:
             self._first = now
-        if step < latest:
-            self.recent = [self._first or now] * (longest + 1)
-        elif step > latest + 1:  # put into another motion
-            self.recent = [now] * (longest + 1)
-        older = self.recent[:-1] if step == latest else self.recent[1:]
-        self.recent = [*older, now]
+        if step - latest not in (0, 1):  # from the start again, or put into another motion
+            before = self._first if step < latest and self._first else now
+            self.recent, latest = [before] * longest, step
+        self.recent = [*self.recent[step != latest :][:longest], now]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -39,9 +38,8 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
     """The draw (set of random changes) that a seed, a few integers, gives for the scenario's
     `disturbances` and its `sensing`. Without them it changes nothing. Its factors do not depend on
     the scenario's numbers."""
-    settings, sensing_seed = scenario.disturbances, None
-    if scenario.sensing is not None:
-        sensing_seed = int(stream(seed, "sensing").integers(2**31))
+    settings = scenario.disturbances
+    sensing_seed = int(stream(seed, "sensing").integers(2**31)) if scenario.sensing else None
     if settings is None:
         return Draw({}, sensing_seed=sensing_seed)
     factors = {}
@@ -87,11 +85,11 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
         robot = robot.model_copy(update={"offsets": offsets.tolist()})
     if draw.terrain_seed is not None:
         terrain = terrain.model_copy(update={"seed": draw.terrain_seed})
-    sections: dict[str, Any] = {"robot": robot, "terrain": terrain, "disturbances": None}
-    if draw.sensing_seed is not None and scenario.sensing is not None:
-        seed = {"seed": draw.sensing_seed}
-        sections["sensing"] = scenario.sensing.model_copy(update=seed)
-    return changed.with_sections(events=[*scenario.events, *draw.events], **sections)
+    if draw.sensing_seed is not None and changed.sensing is not None:
+        sensing = changed.sensing.model_copy(update={"seed": draw.sensing_seed})
+        changed = changed.with_sections(sensing=sensing)
+    events = [*scenario.events, *draw.events]
+    return changed.with_sections(robot=robot, terrain=terrain, events=events, disturbances=None)
 
 
 def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:

@@ -21,7 +21,6 @@ import pydantic
 from pydantic import Field
 
 from tetra_drake.laws.cable import (
-    CableConstants,
     CableLaw,
     Curve,
     elastic_stretch,
@@ -159,7 +158,7 @@ class CurveTable(Section):
         return self
 
 
-class CableGroup(CableConstants):
+class CableGroup(Section):
     """Cables, springs or strings with the same constants. They never push."""
 
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
@@ -167,7 +166,7 @@ class CableGroup(CableConstants):
     its inner nodes, with one tension."""
     stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
     """Tension per elongation. Only a string or a curve needs none."""
-    damping: Damping | None = Field(default=None, ge=0)  # type: ignore[assignment]
+    damping: Damping | None = Field(default=None, ge=0)
     """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
     default is 1 ms times its stiffness."""
     string: bool = Field(default=False, exclude_if=operator.not_)
@@ -230,9 +229,8 @@ class CableGroup(CableConstants):
         }
         group = self.model_copy(update=own) if own else self
         stiffness, damping, free_length = group.stiffness or firm, group.damping, group.free_length
-        table: list[tuple[float, float]] = []
-        if self.curve:
-            table = [*zip(self.curve.stretch, self.curve.force, strict=True)]
+        table = [*zip(self.curve.stretch, self.curve.force, strict=True)] if self.curve else []
+        if table:
             stiffness = table[-1][1] / table[-1][0]
         more = {name: getattr(self, name) for name in ("initial_tension", "quadratic", "cubic")}
         curve = Curve.of_spring(stiffness, table=table, **more)

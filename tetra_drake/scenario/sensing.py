@@ -6,18 +6,18 @@ import operator
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tetra_drake.settings.quantities import by_name
-from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
 
 UNITS = {"lengths": "m", "rates": "m/s", "tensions": "N", "normal_forces": "N"}
 UNITS |= {"q_WB": "rad", "w_WB": "rad/s", "p_WN": "m", "v_WN": "m/s"}
 """Units of the errors of readings, by the names of the readings; see robot.readings.Readings."""
 
-Errors = Annotated[dict[str, float], *by_name(UNITS)]
-Delays = Annotated[dict[str, float], *by_name(dict.fromkeys(UNITS, "s"))]
+_PLUS: Any = lambda number: Annotated[number, Field(ge=0)]  # noqa: E731
+Errors = Annotated[dict[str, float], *by_name(UNITS, _PLUS)]
+Delays = Annotated[dict[str, float], *by_name(dict.fromkeys(UNITS, "s"), _PLUS)]
 
 
 class Sensing(Section):
@@ -38,23 +38,14 @@ class Sensing(Section):
     """Seed of noise and constant errors. A draw of disturbances, or a seed of td.Simulation, takes
     its place."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Sensing:
-        for key in ("noise", "bias", "resolution", "delay"):
-            for name, number in getattr(self, key).items():
-                if number < 0.0:
-                    refuse(f"{key}.{name}", f"found {number:g}, expected 0 or more")
-        return self
-
     def seen(self, name: str, exact: Any, *, step: int) -> np.ndarray:
         """What the sensors show of the reading called `name`, whose exact numbers are `exact`, in
         the control period of number `step`."""
-        number = [*UNITS].index(name)
         width = (*np.shape(exact)[:-1], 3) if name == "q_WB" else np.shape(exact)
         error = np.zeros(width)
         for scale, when in ((self.bias, 0), (self.noise, step + 1)):
             if name in scale:
-                random = np.random.default_rng([self.seed, number, when])
+                random = np.random.default_rng([self.seed, [*UNITS].index(name), when])
                 error += scale[name] * random.standard_normal(width)
         rounded = self.resolution.get(name, 0.0)
         if name != "q_WB":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -82,12 +83,15 @@ class CableNetwork(ConvertibleSystem):
         and the bodies. `names` are the cables' names, for errors. `signals` is the number m of
         signals, not the signals themselves."""
         super().__init__()
-        self._names = names
-        self._curve = model.cables.law.curve
-        self._constants = _numbers_of(model.cables.law)  # a copy, which a context may replace
+        self._names, own = names, model.cables.law
+        self._curve = own.curve
+        # A copy, which a context may replace.
+        self._constants = np.concatenate([*own[:-1], own.curve.rows.ravel()])
         law = _law_of(self._constants, self._curve)
         model = model._replace(cables=model.cables._replace(law=law))
-        self._has_parameters = parameters
+        self._has_parameters, self._law = parameters, law
+        self.warns = False
+        """True if a force that pulls a slack cable is to be told."""
         if parameters:
             self.DeclareNumericParameter(BasicVector(self._constants))
         bodies, count = model.bodies.mass.size, model.cables.signal.size
@@ -136,16 +140,14 @@ class CableNetwork(ConvertibleSystem):
         """
         check_parameters("SetLaw", self, context)
         check_type("SetLaw", "law", law, cable.CableLaw)
-        curve, own, count = law.curve, self.GetLaw(context).curve, len(self._names)
-        if curve.pieces and (np.shape(curve.rows) != own.rows.shape or np.isnan(curve.rows).any()):
-            problem = f"found {np.shape(curve.rows)} numbers, expected {own.rows.shape}, none NaN"
-            raise InputError("SetLaw", "curve", problem)
-        rows: Any = {
-            key: numbers_for_each("SetLaw", key, getattr(law, key), count=count, least=0.0)
+        count, own = len(self._names), self.GetLaw(context).curve
+        curve = np.ravel(law.curve.rows if law.curve.pieces else own.rows)
+        numbers = [
+            numbers_for_each("SetLaw", key, getattr(law, key), count=count, least=0.0)
             for key in cable.NUMBERS
-        }
-        numbers = _numbers_of(cable.CableLaw(**rows, curve=curve if curve.pieces else own))
-        context.get_mutable_numeric_parameter(0).SetFromVector(numbers)
+        ]
+        numbers.append(numbers_for_each("SetLaw", "curve", curve, count=own.rows.size))
+        context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(numbers))
 
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
@@ -165,11 +167,23 @@ class CableNetwork(ConvertibleSystem):
             signals = self._signals.Eval(context)
         state, table = self._state.Eval(context), self._forces.cable_forces
         total = self._compute_forces(self._parts, state, signals, force)
+        if self.warns and not moves_only:
+            self._warn(table)
         if math.isfinite(total) or not np.isfinite(state).all():
             return table
         place = int(np.argmin(np.isfinite(table).all(axis=1)))
         reason = f"the ends of cable '{self._names[place]}' meet, or its forces are too large"
         raise SimulationFailure(time=context.get_time(), reason=reason)
+
+    def _warn(self, table: np.ndarray) -> None:
+        """Warns, once, of a signal that pulls a slack cable."""
+        slack = self._law.free_length - table[:, cable.LENGTH]
+        pulled = np.where(slack > 0.0, table[:, cable.TENSION], 0.0)
+        if pulled.any():
+            most, self.warns = int(pulled.argmax()), False
+            force = f"{pulled[most]:.3g} N, which wind no cable; see actuation of AddCables"
+            told = f"'{self._names[most]}' is slack by {1e3 * slack[most]:.3g} mm, but pulled with"
+            warnings.warn(f"{told} {force}", RuntimeWarning, stacklevel=2)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._table(context, output.get_mutable_value())
@@ -183,19 +197,12 @@ class CableNetwork(ConvertibleSystem):
         return self._forces.drives[:, actuator.RATE]
 
 
-def _numbers_of(law: cable.CableLaw) -> np.ndarray:
-    """The parameters of a CableNetwork: the constants of all cables, field after field, then their
-    curves."""
-    return np.concatenate([*law[:-1], law.curve.rows.ravel()])
-
-
 def _law_of(constants: np.ndarray, curve: cable.Curve) -> cable.CableLaw:
     """The parameters of a CableNetwork as a CableLaw of arrays (cables,), which share their
     memory, with a curve like `curve`."""
     numbers, rows = np.split(constants, [constants.size - curve.rows.size])
     fields = np.split(numbers, len(cable.NUMBERS))
-    named: Any = dict(zip(cable.NUMBERS, fields, strict=True))
-    return cable.CableLaw(**named, curve=curve._replace(rows=rows.reshape(-1, 5)))
+    return cable.CableLaw._make([*fields, curve._replace(rows=rows.reshape(-1, 5))])
 
 
 @dataclass(frozen=True)
@@ -228,6 +235,7 @@ def AddCables(
     slack: bool = True,
     scene_graph: SceneGraph | None = None,
     parameters: bool = False,
+    warns: bool = True,
     name: str = "cables",
 ) -> CableNetwork:
     """Adds cables between bodies of a plant, or from a body to the world.
@@ -241,14 +249,18 @@ def AddCables(
         cables: the cables: names, ends and constants.
         actuated: for each signal, in the order of the signals, the names of the cables that it
             drives. The keys name the signals, in errors only. By default all cables are passive.
-        actuation: kind of the actuators, Force() by default. Kinds with states are added as the
-            system NAME_actuators, which is Drake's Integrator of `drive_rates`.
+        actuation: kind of the actuators. Force(), the default, adds the signal to the tension, also
+            of a slack cable: for cables that stay taut. Winch() winds and pays out, as if signals
+            were lengths: for cables that are shortened. TensionMotor() is for commanded tensions.
+            Kinds with states are added as the system NAME_actuators, which is Drake's Integrator of
+            `drive_rates`.
         drives: states of the actuators at t = 0, in the order of the cables. By default those
             that fit signals of 0 at the plant's default positions.
         slack: False if cables also push.
         scene_graph: where to show the cables.
         parameters: True if the constants of the cables are parameters of the context, which
             CableNetwork.SetLaw() replaces. The forces then take a few microseconds more.
+        warns: True for a RuntimeWarning when a Force first pulls a slack cable.
         name: name of the system.
 
     Raises:
@@ -264,6 +276,7 @@ def AddCables(
     check_type("AddCables", "actuation", actuation, ActuatorKind)
     check_type("AddCables", "slack", slack, bool)
     check_type("AddCables", "parameters", parameters, bool)
+    check_type("AddCables", "warns", warns, bool)
     pieces = _default_lengths(plant, cables)
     lengths = np.array([sum(of_pieces) for of_pieces in pieces])
     nodes = Nodes.of(plant, (frame for one in cables for frame in one.path))
@@ -290,6 +303,7 @@ def AddCables(
     }
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, **laws)
     network = CableNetwork(model, names=names, signals=len(actuated), parameters=parameters)
+    network.warns = warns and slack and not len(starts) and driven.size > 0
     builder.AddNamedSystem(name, network)
     Attach(builder, plant, network)
     if len(starts):

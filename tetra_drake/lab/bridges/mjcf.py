@@ -32,7 +32,6 @@ from tetra_drake.lab.bridges.mjcf_file import compiled_model
 from tetra_drake.lab.bridges.mjcf_forces import (
     actuator_laws,
     limit_laws,
-    model_coefficients,
     obey_flags,
     tendon_laws,
 )
@@ -134,7 +133,7 @@ class _MjcfTranslation:
         """Stiffness, damping and free length of each tendon, or of its limit (tendons, 3)."""
         self.is_string = model.tendon_limited & (self.laws[:, 0] <= 0.0)
         self.laws[self.is_string] = limit_laws(model)[self.is_string]
-        poly, is_driven = model_coefficients(model), np.isin(np.arange(model.ntendon), self.driven)
+        poly, is_driven = model.tendon_stiffnesspoly, np.isin(np.arange(model.ntendon), self.driven)
         self.hardens = poly.any(axis=1) & (poly >= 0.0).all(axis=1) & ~is_driven & ~self.is_string
         """Tendons whose springs are polynomials of the stretch (tendons,)."""
         for what, kind, is_changed in self._changes():
@@ -260,8 +259,8 @@ class _MjcfTranslation:
         law = map(_text, self.laws[tendon], ["N/m", "N*s/m", "m"])
         settings = dict(zip(["stiffness", "damping", "free_length"], law, strict=True))
         if self.hardens[tendon]:
-            square, cube = model_coefficients(self.model)[tendon].tolist()
-            settings |= {"quadratic": _text(square, "N/m^2"), "cubic": _text(cube, "N/m^3")}
+            terms = map(_text, self.model.tendon_stiffnesspoly[tendon], ["N/m^2", "N/m^3"])
+            settings |= zip(["quadratic", "cubic"], terms, strict=True)
         path = [node for node, _ in itertools.groupby(sites, self.node_of.__getitem__)]
         return _MjcfPart(self._name("tendon", tendon), path, settings)
 
@@ -463,7 +462,7 @@ class _MjcfTranslation:
         yield "the setting 'limited' of tendons, left out", "tendon", is_set
         is_low = self.is_string & (model.tendon_range[:, 0] > 0.0)
         yield "lower limits of tendons, left out", "tendon", is_low
-        is_left = model_coefficients(model).any(axis=1) & ~self.hardens
+        is_left = model.tendon_stiffnesspoly.any(axis=1) & ~self.hardens
         yield "the setting 'stiffnesspoly' of tendons, left out", "tendon", is_left
         names = "actfrclimited frictionloss armature dampingpoly springyield"
         for name in names.split():  # earlier versions of MuJoCo have not all of them

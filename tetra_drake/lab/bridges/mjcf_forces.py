@@ -93,11 +93,6 @@ def tendon_laws(model: Any, driven: np.ndarray) -> np.ndarray:
     return np.stack([stiffness, damping, free_length], axis=1)
 
 
-def model_coefficients(model: Any) -> np.ndarray:
-    """Coefficients (N/m², N/m³) of the springs of tendons beyond their stiffness (tendons, 2)."""
-    return np.asarray(model.tendon_stiffnesspoly).reshape(-1, 2)
-
-
 def limit_laws(model: Any) -> np.ndarray:
     """Stiffness, damping and free length (tendons, 3) of cables like the tendons' upper limits.
 
