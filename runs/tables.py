@@ -222,14 +222,16 @@ def results_table(runs: Runs) -> str:
 
 
 def trials_table(name: str, runs: Runs) -> str:
-    """Table of the fittest gait of each trial of a run, on all engines and on disturbed robots.
-    Below it, the trials with different distances on the engines."""
+    """Table of the fittest gait of each trial of a run, on two engines and on disturbed robots.
+    Below it, the trials with another distance on the diagram."""
     run, units, rows = runs[name], scenario_of(name).units, []
     for trial in run.best_gaits.index:
         compiled, diagram, mujoco = distances_of(run, trial)
         row = {
             "trial": trial,
-            "distances": np.array([compiled, diagram, mujoco]) / units.length,
+            "compiled": compiled / units.length,
+            "diagram": diagram / units.length,
+            "mujoco": mujoco / units.length,
             "kept": 100.0 * run.disturbed.loc[trial, "kept"],
             "is_apart": not abs(compiled - diagram) <= APART,
         }
