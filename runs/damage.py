@@ -345,7 +345,7 @@ def by_cable(shares: pandas.DataFrame, plans: pandas.DataFrame) -> pandas.DataFr
     table = shares.groupby("group", sort=False)
     planner = plans.groupby("group")["share"].mean()
     medians = table[["lost", "found", "trials"]].median()
-    return medians.assign(least=table["found"].min(), planner=planner)
+    return medians.assign(planner=planner)
 
 
 _PLANNER: Any = {"color": "black", "marker": "x", "linestyle": "", "markersize": 4.0}

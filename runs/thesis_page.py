@@ -60,11 +60,11 @@ DRAWS = 2000
 
 
 def setting(label: str, given: Any, key: str) -> str:
-    """Row of a table of settings: the thesis's value, and our key; our value if it differs."""
+    """Item of a list of settings: the thesis's value, and our key; our value if it differs."""
     scenario = load_scenario("thesis")
     ours = flattened(written(scenario.model_dump(), plainest))[key]
     same = scenario.with_changes({key: given}).values()[key] == scenario.values()[key]
-    return f"| {label} | {given} | `{key}`{'' if same else f', **not** {ours}'} |"
+    return f"- {label}: {given}, `{key}`{'' if same else f', **not** {ours}'}"
 
 
 def over_trials(values: pandas.Series, digits: int = 2) -> str:
