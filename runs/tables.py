@@ -25,7 +25,7 @@ from page import rendered
 from parting import partings
 from PIL import Image
 from readings import RECORD, load_record
-from record import DIAGRAM, EXPERIMENTS, PICTURE
+from record import EXPERIMENTS, PICTURE
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
@@ -97,8 +97,6 @@ class Best:
     """The best gait of a run for the gallery."""
 
     title: str
-    diagram: str
-    """File of the picture beside PICTURE."""
     reached: Mapping[str, float]
     """Distances (m) by ENGINES, or angles (rad) if the objective is about turning; NaN if not
     simulated."""
@@ -156,7 +154,6 @@ def best_gait(name: str, run: Analysis) -> Best:
     known = [*alike, reached[0] - changed, reached[0] + changed, *draws[list(DRAWN)]]
     return Best(
         title,
-        f"{DIAGRAM}.svg",
         by_engine,
         kept,
         scenario.units,
@@ -222,7 +219,7 @@ def results_table(runs: Runs) -> str:
 
 
 def trials_table(name: str, runs: Runs) -> str:
-    """Table of the fittest gait of each trial of a run, on two engines and on disturbed robots.
+    """List of the fittest gaits of the trials of a run, on two engines and on disturbed robots.
     Below it, the trials with another distance on the diagram."""
     run, units, rows = runs[name], scenario_of(name).units, []
     for trial in run.best_gaits.index:
@@ -237,7 +234,8 @@ def trials_table(name: str, runs: Runs) -> str:
         }
         rows.append(row)
     apart_by = f"{rounded(APART / units.length, 1)} {units.length_word}"
-    return rendered("trials.md", rows=rows, units=units, apart_by=apart_by)
+    on_mujoco = bool(np.isfinite([row["mujoco"] for row in rows]).any())
+    return rendered("trials.md", rows=rows, units=units, apart_by=apart_by, on_mujoco=on_mujoco)
 
 
 def partings_table(name: str, other: str) -> str:

@@ -166,7 +166,7 @@ def test_the_gallery_opens_every_replay_in_its_folder(runs, tmp_path, monkeypatc
 def test_a_run_has_its_page_and_picture(name):
     folder = tables.HERE / name
     text = (folder / tables.README).read_text(encoding="utf-8")
-    assert "<!-- to be written -->" not in text and "(../README.md#tables-of-the-runs)" in text
+    assert "<!-- to be written -->" not in text and "(../README.md#numbers-of-the-runs)" in text
     assert ("The engines differ by more" in text) == ("## Why the engines differ" in text)
     assert (folder / record.PICTURE).exists()
 

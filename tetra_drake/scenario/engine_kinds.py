@@ -49,8 +49,8 @@ class Drake(EngineSettings):
     """When a node may change its mode: at the end of steps, or where a witness function is zero.
     `witness` needs short steps."""
     look_ahead: Time | None = Field(default=None, ge=0)
-    """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none. By
-    default 20 us; 0.3 ms where friction is nearly viscous."""
+    """Shortest step that ends at a predicted mode change; 0 for none. By default 20 us; 0.3 ms
+    where friction is nearly viscous."""
 
 
 class Compiled(EngineSettings):

@@ -68,8 +68,8 @@ class CmaEs(OptimizerSettings):
     """Number of random gaits that are evaluated before each search."""
     starts: int = Field(default=5, ge=1, le=1000)
     """Number of searches that are tried, for 1,000 evaluations each and half of all at most; the
-    best continues. A search starts at the mean of the best quarter of its sample; without one, in
-    the middle of the ranges or at random gaits."""
+    best continues. A search starts at the mean of the best quarter of its sample, or without one in
+    the middle of the ranges or at random."""
 
 
 class RandomSearch(OptimizerSettings):

@@ -42,7 +42,7 @@ class RollingPolicy(PolicyKind):
     clock: Time = Field(default=2.0, gt=0)
     """Period of the clock."""
     most: float = Field(default=0.5, gt=0, lt=1)
-    """Largest change of a free length, as a share of the free length."""
+    """Largest change of a free length, as a share of it."""
 
     def parameters(self, blueprint: Blueprint) -> Mapping[str, PolicyBounds]:
         return dict.fromkeys(["1", "x", "z", "x²", "xz", "z²", "sx", "sz"], (-1.0, 1.0))

@@ -316,7 +316,7 @@ class StructureFile(RobotSettings):
     """Stiffness of pinned nodes, and of joints that give none; by default as for anchors."""
     bodies: Keyed[Name, JoinedBody] = Field(default={})
     actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
-    """Cables that each oscillator drives, such as side a b, nodes in either order."""
+    """Cables of each oscillator, such as side a b, nodes in either order."""
     masses: Keyed[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
     as a payload."""

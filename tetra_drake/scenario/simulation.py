@@ -21,11 +21,11 @@ class SimulationSection(Section):
     """Time at which the steady walk begins, for fitness and metrics (section 2.3). By default a
     quarter of the duration, at most 3 s."""
     max_evaluations: int = Field(ge=1)
-    """Largest number of evaluations of the derivatives in one simulation."""
+    """Largest number of evaluations of the derivatives in a simulation."""
     sample_period: Time = Field(gt=0)
     """Time between samples of a recorded trajectory."""
     control_period: Time = Field(default=0.02, gt=0)
-    """Time between actions of a controller. See td.Simulation."""
+    """Time between actions of a controller."""
     max_speed: Speed | None = Field(default=None, gt=0)
     """Speed of a body above which a simulation has diverged. By default more than fall, cables and
     actuators can give; at least 10.16 m/s."""
