@@ -162,14 +162,14 @@ class CurveTable(Section):
 class CableGroup(Section):
     """Cables, springs or strings with the same constants. They never push."""
 
+    damping: Damping | None = Field(default=None, ge=0)
+    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
+    default is 1 ms times its stiffness."""
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
     """The nodes that each cable joins. A cable such as [a, b, c] runs over frictionless rings at
     its inner nodes, with one tension."""
     stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
     """Tension per elongation. Only a string or a curve needs none."""
-    damping: Damping | None = Field(default=None, ge=0)
-    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
-    default is 1 ms times its stiffness."""
     string: bool = Field(default=False, exclude_if=operator.not_)
     """True for strings, which hardly stretch. Without a stiffness they get the default of
     `anchor_stiffness`."""
