@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ from pydrake.visualization import VisualizationConfig
 from scipy.integrate import solve_ivp
 
 from tetra_drake.errors import SimulationFailure
-from tetra_drake.laws.actuator import Winch
+from tetra_drake.laws.actuator import Force, Winch
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Flat
@@ -74,6 +76,35 @@ def test_an_arm_swings_on_a_cable_over_a_ring_at_its_tip_as_its_energy_says():
     assert np.abs(expected).min() > 0.1
     found = state_at(builder.Build(), 0.5, accuracy=1e-5)
     np.testing.assert_allclose(found, expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize("actuation", [Force(), Winch(max_force=50.0, max_speed=1.0)])
+def test_a_force_on_a_slack_cable_is_told_once(actuation):
+    builder, plant, _, (left, right) = rod_with_tendons()
+    loose = dataclasses.replace(left, law=LAW._replace(free_length=2.0))
+    cables, driven = [loose, right], {"motor": [loose.name]}
+    system = AddCables(builder, plant, cables=cables, actuated=driven, actuation=actuation)
+    context = builder.Build().CreateDefaultContext()
+    own = system.GetMyMutableContextFromRoot(context)
+    signal = system.GetInputPort("signals")
+    signal.FixValue(own, [0.0])
+    lengths = system.GetOutputPort("lengths").Eval(own)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        system.GetOutputPort("tensions").Eval(own)
+    signal.FixValue(own, [3.0])
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        for _ in range(2):
+            signal.FixValue(own, [3.0])
+            tension = system.GetOutputPort("tensions").Eval(own)[0]
+    if isinstance(actuation, Winch):
+        assert (tension, told) == (0.0, [])
+        return
+    assert tension == 3.0
+    (only,) = told
+    assert f"'{loose.name}' is slack by {1e3 * (2.0 - lengths[0]):.3g} mm" in str(only.message)
+    assert "3 N" in str(only.message) and only.category is RuntimeWarning
 
 
 def test_a_hinged_rod_sinks_into_the_ground_by_half_its_weight_over_the_stiffness():
