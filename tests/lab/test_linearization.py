@@ -296,9 +296,6 @@ def test_the_page_shows_one_mode_with_damping(tmp_path):
     assert set(film["progress"]["values"]) == {study.damped.frequencies[1]}
     poses = film["resolution"] * np.cumsum(film["poses"], axis=1).reshape(3, 7, -1)
     assert 0.005 < np.ptp(poses[:, :3], axis=2).max() < 0.05
-    with pytest.raises(InputError) as caught:
-        save_structure_page(study, tmp_path / "none.html", mode=10)
-    assert (caught.value.key, (tmp_path / "none.html").exists()) == ("mode", False)
 
 
 PRISM = "prism"
