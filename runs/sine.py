@@ -39,10 +39,15 @@ FREQUENCIES, LAGS = np.arange(0.3, 2.6, 0.2), np.arange(15.0, 151.0, 15.0)
 TRIED = FREQUENCIES.size * LAGS.size
 
 
-def oscillators(amplitude: float, **more: float) -> PhaseOscillators:
+def oscillators(amplitude: float, *, start_up: float = 1.25) -> PhaseOscillators:
     """Oscillators whose gaits are travelling sines of this amplitude (N)."""
-    fixed = {"amplitude": [1.0, 1.0], "coupling": [5.0, 5.0], "common": ["lag"]}
-    return PhaseOscillators(gain=amplitude, **fixed, **more)
+    return PhaseOscillators(
+        gain=amplitude,
+        start_up=start_up,
+        amplitude=[1.0, 1.0],
+        coupling=[5.0, 5.0],
+        common=["lag"],
+    )
 
 
 def grid(space: ParameterSpace) -> list[Vector]:
