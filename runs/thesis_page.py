@@ -23,6 +23,7 @@ from claims import claims, load_motion
 from page import rendered
 from record import load_times
 from settle import difference_of_means, numbers
+from sine import TRIED
 from tables import aspect, best_gait
 from thesis_figures import EVOLVED, mean_fitness, save_figures
 
@@ -243,7 +244,7 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
         former=trials_numbers(load_run(FORMER)),
-        sines=sines,
+        tried=TRIED,
         sine=lambda name: fixed(sines[name]["distance_in"]),
         setting=setting,
         reached=reached,
