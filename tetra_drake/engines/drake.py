@@ -131,6 +131,9 @@ class _DiagramRobot:
     def _build(self, robot: Robot) -> None:
         """Makes the diagram of a robot, and what follows its simulation."""
         driven, settings = self._driven, robot.scenario.settings_of(Drake)
+        if robot.scenario.events:  # _become() plays them
+            until = robot.scenario.with_sections(events=[])
+            robot = dataclasses.replace(robot, scenario=until)
         if (gait := driven.oscillating) is not None:
             diagram = MakeTensegrityDiagram(robot, gait, steering=driven.steering)
         elif driven.pilot is not None:
@@ -300,8 +303,6 @@ def MakeDisturbedSimulator(
     if scenario.disturbances is None:
         raise InputError(scenario.name, "disturbances", "is missing; it says what varies")
     [draw] = fresh_draws(scenario, generator(), 1)
-    if scenario.events or draw.events:
-        raise InputError(scenario.name, "events", "found some; only td.simulate() knows them")
     robot = Robot.of(disturbed(scenario, draw))
     return MakeSimulator(MakeTensegrityDiagram(robot, gait), robot, scenario.settings_of(Drake))
 
