@@ -34,7 +34,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import GetIntegrationSchemes, ResetIntegratorFromFlags, Simulator
-from script import run_script
+from script import read_settings, run_script
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.mjcf import make_mjcf
@@ -42,7 +42,6 @@ from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import read_text
 from tetra_drake.formatting import TextTable, fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
@@ -56,11 +55,9 @@ from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.yaml_text import parse_yaml
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
-FILE = Path(__file__).with_suffix(".yaml")
-GIVEN: dict[str, Any] = parse_yaml(read_text(FILE, "settings"), FILE)
+GIVEN: dict[str, Any] = read_settings(Path(__file__).with_suffix(".yaml"))
 """What is measured, see the file."""
 LANES = 8
 """Number of gaits that a processor with AVX-512 simulates in the time of one."""
