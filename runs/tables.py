@@ -14,7 +14,6 @@ import functools
 import json
 import math
 import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,10 +26,10 @@ from parting import partings
 from PIL import Image
 from readings import RECORD, load_record
 from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
+from script import run_script
 from sine import RECORD as SINES
 from sine import TRIED
 
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
@@ -299,7 +298,4 @@ def main(arguments: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"tables.py: {error}")
+    run_script(main)
