@@ -82,11 +82,3 @@ def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
     # Five tetrahedra of 20.29 g weigh 5 * 0.02029 kg * 9.80665 m/s^2 = 0.9949 N.
     assert 1.0 / senses.per_load[0] == pytest.approx(0.9949, rel=1e-3)
     assert senses.carriers.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]
-
-
-def test_a_gait_that_does_not_fit_is_refused(scenario, robot, refused):
-    gait = seeded_gait(scenario)
-    fewer = {name: x for name, x in gait.parameters.items() if name != "weight 2->1 extensor"}
-    gait = dataclasses.replace(gait, parameters=fewer)
-    with refused(f"gait {gait.name}", "parameters", "'weight 2->1 extensor'"):
-        robot.oscillators(gait)

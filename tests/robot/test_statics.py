@@ -53,15 +53,6 @@ def forces_on_bodies(joined: Joined, tensions: np.ndarray) -> np.ndarray:
     return cable_wrenches(p_WN=scaled, body_of_node=bodies, segments=segments) @ tensions
 
 
-def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
-    wrenches = cable_wrenches(
-        p_WN=np.array([[0.0, 1.0, 2.0], [3.0, 1.0, 2.0]]),
-        body_of_node=np.array([0, 1]),
-        segments=straight(np.array([[0, 1]])),
-    )
-    assert wrenches.reshape(2, 6).tolist() == [[0, 2, -1, 1, 0, 0], [0, -2, 1, -1, 0, 0]]
-
-
 KNOWN = [(prism(3, 30.0), 1, 1), (prism(3, 31.0), 0, 0), (prism(4, 45.0), 1, 3)]
 KNOWN += [(prism(3, 30.0, radius=1e-6, height=1.5e-6), 1, 1), (shipped("six_bar"), 1, 1)]
 KNOWN += [(nested_tetrahedra(2.0 * 0.0254), 1, 1)]

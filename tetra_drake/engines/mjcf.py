@@ -15,7 +15,7 @@ from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.actuator import has_drive
-from tetra_drake.laws.cable import tendon_faults
+from tetra_drake.laws.cable import tendon_coefficients, tendon_faults
 from tetra_drake.laws.contact import NormalForce
 from tetra_drake.laws.inertia import XX
 from tetra_drake.robot.robot import Robot
@@ -280,7 +280,8 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
     width = structure.least_radius / 2
     for number, cable in enumerate(structure.cables):
         name = structure.cable_names[number]
-        law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
+        coefficients = tendon_coefficients(cable["curve"]) or cable["stiffness"]
+        law = {"stiffness": coefficients, "damping": cable["damping"]}
         least = 0.0 if structure.slack else cable["free_length"]
         springlength = [least, cable["free_length"]]  # the spring exerts no force in between
         colour = ACTUATED_COLOUR if name in motors else PASSIVE_COLOUR

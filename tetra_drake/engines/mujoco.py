@@ -36,7 +36,7 @@ from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudg
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws.actuator import DRIVE, DRIVE_COLUMNS, RATE
-from tetra_drake.laws.cable import PASSIVE
+from tetra_drake.laws.cable import LENGTH, PASSIVE, steepest
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.laws.forces import Forces, Parts, compute_strut_forces, pull_of_cable
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
@@ -101,7 +101,9 @@ def is_stable(robot: Robot, step: float) -> bool:
     taut = Unactuated(robot.model._replace(slack=False, anchors=free))
     force_at_rest(taut, robot.structure.initial_state)
     taut.forces.near_struts.count[:] = 0
-    stiffer = cables.law._replace(stiffness=cables.law.stiffness + 2.0 / step * cables.law.damping)
+    law, lengths = cables.law, taut.forces.cable_forces[:, LENGTH]
+    stiffness = steepest(lengths - law.free_length, law) + 2.0 / step * law.damping
+    stiffer = law._replace(stiffness=stiffness, curve=law.curve._replace(pieces=0))
     taut.model = taut.model._replace(cables=cables._replace(law=stiffer))
     stiffness = stiffness_at_rest(taut).toarray()
     return bool(eigvalsh(step**2 * stiffness, mass_matrix(taut)).max() < 4.0)

@@ -123,7 +123,8 @@ class Robot:
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
-                laws[number] = dict.fromkeys(laws[number], 0.0)
+                law = laws[number].items()
+                laws[number] = {k: x.scaled(0.0) if k == "curve" else 0.0 for k, x in law}
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),

@@ -96,17 +96,13 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def cables(self) -> np.ndarray:
-        """Cables with their nodes, signals and constants: records (cables,) of dtype
-        laws.cable.CABLE. Their `signal` is the index of the oscillator that drives the cable, or
-        laws.cable.PASSIVE without actuator."""
-        cables = np.zeros(len(self.cable_names), dtype=cable.CABLE)
-        cables["node_a"], cables["node_b"] = self.cable_ends.T
-        cables["signal"] = cable.PASSIVE
+        """Cables with their nodes, signals and constants: records (cables,) of
+        laws.cable.cable_type(). Their `signal` is the index of the oscillator that drives the
+        cable, or laws.cable.PASSIVE without actuator."""
+        laws = [cable.CableLaw(**law) for law in self.cable_laws]
+        cables = cable.CableLaw.put(laws, *self.cable_ends.T)
         for oscillator, driven in enumerate(self.groups):
             cables["signal"][list(driven)] = oscillator
-        laws = [cable.CableLaw(**law) for law in self.cable_laws]
-        for name in cable.CableLaw._fields:
-            cables[name] = [getattr(law, name) for law in laws]
         return cables
 
     @functools.cached_property

@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -125,7 +125,7 @@ class Blueprint:
     cable_ends: np.ndarray
     """Indices of the two end nodes of each cable (cables, 2). The node of the body with the lower
     index comes first."""
-    cable_laws: tuple[Mapping[str, float], ...]
+    cable_laws: tuple[Mapping[str, Any], ...]
     """Constants of each cable's force law, by the names of laws.cable.CableLaw."""
     slack: bool
     """True if cables go slack instead of pushing."""
@@ -138,6 +138,9 @@ class Blueprint:
     cable_rings: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
     """Inner nodes of each cable that runs over rings, from its first end to its second, by the
     index of the cable. Such cables come after all straight ones."""
+    cable_limits: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """Greatest tensions (cables,) that the springs bear, infinite without a limit; empty if no
+    cable has one."""
     joints: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), dtype=int))
     """Indices of the two nodes of each ball joint (joints, 2), nodes of two bodies at one place.
     The node of the body with the lower index comes first."""

@@ -30,17 +30,19 @@ class Draw:
     moves: np.ndarray | None = None
     """Displacement of each body at t = 0 (n, 3), in m."""
     terrain_seed: int | None = None
+    sensing_seed: int | None = None
     events: tuple[Event, ...] = ()
     """Events in addition to the scenario's: cables that break."""
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
     """The draw (set of random changes) that a seed, a few integers, gives for the scenario's
-    `disturbances`. Without them it changes nothing. Its factors do not depend on the scenario's
-    numbers."""
+    `disturbances` and its `sensing`. Without them it changes nothing. Its factors do not depend on
+    the scenario's numbers."""
     settings = scenario.disturbances
+    sensing_seed = int(stream(seed, "sensing").integers(2**31)) if scenario.sensing else None
     if settings is None:
-        return Draw({})
+        return Draw({}, sensing_seed=sensing_seed)
     factors = {}
     for joined, spread in settings.spreads.items():
         factors[joined] = 1.0 + stream(seed, *separate(joined)).uniform(-spread, spread)
@@ -57,13 +59,14 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
         factors=factors,
         moves=reach * moves if reach else None,
         terrain_seed=terrain_seed if hasattr(scenario.terrain, "seed") else None,
+        sensing_seed=sensing_seed,
         events=events,
     )
 
 
 def stream(seed: Sequence[int], *names: str) -> np.random.Generator:
     """Random generator for the disturbance or the tolerance of the scenario keys `names`, or for
-    "start", "terrain" or "cuts". Its numbers do not depend on what else is random."""
+    "start", "terrain", "sensing" or "cuts". Its numbers do not depend on what else is random."""
     digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
     words = np.frombuffer(digest, dtype="<u4")
     return np.random.default_rng(np.random.SeedSequence(list(seed), spawn_key=words.tolist()))
@@ -83,6 +86,9 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
         robot = robot.model_copy(update={"offsets": offsets.tolist()})
     if draw.terrain_seed is not None:
         terrain = terrain.model_copy(update={"seed": draw.terrain_seed})
+    if draw.sensing_seed is not None and changed.sensing is not None:
+        sensing = changed.sensing.model_copy(update={"seed": draw.sensing_seed})
+        changed = changed.with_sections(sensing=sensing)
     events = [*changed.events, *draw.events]
     return changed.with_sections(robot=robot, terrain=terrain, events=events, disturbances=None)
 

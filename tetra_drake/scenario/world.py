@@ -22,6 +22,7 @@ from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoc
 from tetra_drake.scenario.events import Event, check_taken, up_to_each
 from tetra_drake.scenario.policies import Policy
 from tetra_drake.scenario.robot_settings import RobotKind
+from tetra_drake.scenario.sensing import Sensing
 from tetra_drake.scenario.simulation import SimulationSection
 from tetra_drake.settings.refusals import TAG, hint, refuse
 from tetra_drake.settings.section import Kinds, Section, Tree, flattened, parts_of
@@ -66,6 +67,9 @@ class World(Section):
     policy: Policy | None = Field(default=None, exclude_if=lambda policy: policy is None)
     """A closed loop in place of the oscillator network; evolution searches its parameters. An empty
     key removes the base's."""
+    sensing: Sensing | None = Field(default=None, exclude_if=lambda sensing: sensing is None)
+    """Errors and delays with which policies and controllers see the robot. An empty key removes the
+    base's."""
     simulation: SimulationSection
     engine: EngineKind = Drake()
     events: list[Event] = Field(default=[], exclude_if=operator.not_)

@@ -155,6 +155,7 @@ def MakeTensegrityDiagram(
         slack=structure.slack,
         scene_graph=scene,
         parameters=parameters,
+        warns=False,
     )
     if ground is None:
         ground = AddGroundContact(

@@ -30,7 +30,12 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.lab.bridges.mjcf_file import compiled_model
-from tetra_drake.lab.bridges.mjcf_forces import actuator_laws, limit_laws, obey_flags, tendon_laws
+from tetra_drake.lab.bridges.mjcf_forces import (
+    actuator_laws,
+    limit_laws,
+    obey_flags,
+    tendon_laws,
+)
 from tetra_drake.scenario.blueprint import TOLERANCE
 from tetra_drake.scenario.robot_structure import MOST_NODES
 from tetra_drake.scenario.structure_graph import unused_name
@@ -135,6 +140,9 @@ class _MjcfTranslation:
         """Stiffness, damping and free length of each tendon, or of its limit (tendons, 3)."""
         self.is_string = model.tendon_limited & (self.laws[:, 0] <= 0.0)
         self.laws[self.is_string] = limit_laws(model)[self.is_string]
+        poly, is_driven = model.tendon_stiffnesspoly, np.isin(np.arange(model.ntendon), self.driven)
+        self.hardens = poly.any(axis=1) & (poly >= 0.0).all(axis=1) & ~is_driven & ~self.is_string
+        """Tendons whose springs are polynomials of the stretch (tendons,)."""
         for what, kind, is_changed in self._changes():
             for number in np.flatnonzero(is_changed).tolist():
                 self._note(what, kind, number)
@@ -260,6 +268,9 @@ class _MjcfTranslation:
         """Cable of a tendon over sites."""
         law = map(_text, self.laws[tendon], ["N/m", "N*s/m", "m"])
         settings = dict(zip(["stiffness", "damping", "free_length"], law, strict=True))
+        if self.hardens[tendon]:
+            terms = map(_text, self.model.tendon_stiffnesspoly[tendon], ["N/m^2", "N/m^3"])
+            settings |= zip(["quadratic", "cubic"], terms, strict=True)
         path = [node for node, _ in itertools.groupby(sites, self.node_of.__getitem__)]
         return _MjcfPart(self._name("tendon", tendon), path, settings)
 
@@ -476,7 +487,9 @@ class _MjcfTranslation:
         yield "the setting 'limited' of tendons, left out", "tendon", is_set
         is_low = self.is_string & (model.tendon_range[:, 0] > 0.0)
         yield "lower limits of tendons, left out", "tendon", is_low
-        names = "actfrclimited frictionloss armature stiffnesspoly dampingpoly springyield"
+        is_left = model.tendon_stiffnesspoly.any(axis=1) & ~self.hardens
+        yield "the setting 'stiffnesspoly' of tendons, left out", "tendon", is_left
+        names = "actfrclimited frictionloss armature dampingpoly springyield"
         for name in names.split():  # earlier versions of MuJoCo have not all of them
             values = getattr(model, f"tendon_{name}", np.zeros(model.ntendon))
             is_set = [np.any(value) for value in values]
