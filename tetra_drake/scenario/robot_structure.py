@@ -82,7 +82,7 @@ def _check_name(name: object) -> object:
     refused: they separate the parts of cable names, the parts of keys, and keys."""
     if not isinstance(name, str):
         refuse("", f"found the name {name}, expected a text, such as n{name}")
-    if re.search(r"[\s.,\[\]]", name):
+    if re.search(r"[\s.,\[\]]", name) or not name.isprintable():
         refuse("", f"found the name '{name}', expected one without blanks, dots, commas, brackets")
     return name
 
@@ -161,13 +161,13 @@ class CurveTable(Section):
 class CableGroup(Section):
     """Cables, springs or strings with the same constants. They never push."""
 
+    damping: Damping | None = Field(default=None, ge=0)
+    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
+    default is 1 ms times its stiffness."""
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
     """The nodes of each cable. [a, b, c] runs over a frictionless ring at b, with one tension."""
     stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
     """Tension per elongation. Only a string or a curve needs none."""
-    damping: Damping | None = Field(default=None, ge=0)
-    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
-    default is 1 ms times its stiffness."""
     string: bool = Field(default=False, exclude_if=operator.not_)
     """True for strings, which hardly stretch. Without a stiffness they get the default of
     `anchor_stiffness`."""
