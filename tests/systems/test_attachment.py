@@ -115,7 +115,6 @@ def test_a_force_on_a_slack_cable_is_told_once(actuation):
     own = system.GetMyMutableContextFromRoot(context)
     signal = system.GetInputPort("signals")
     signal.FixValue(own, [0.0])
-    lengths = system.GetOutputPort("lengths").Eval(own)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         system.GetOutputPort("tensions").Eval(own)
@@ -130,8 +129,8 @@ def test_a_force_on_a_slack_cable_is_told_once(actuation):
         return
     assert tension == 3.0
     (only,) = told
-    assert f"'{loose.name}' is slack by {1e3 * (2.0 - lengths[0]):.3g} mm" in str(only.message)
-    assert "3 N" in str(only.message) and only.category is RuntimeWarning
+    assert f"'{loose.name}' is slack, and its signal pulls it with 3 N" in str(only.message)
+    assert only.category is RuntimeWarning
 
 
 def test_tendons_of_an_arm_of_drakes_are_its_linear_spring_dampers():

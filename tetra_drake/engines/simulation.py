@@ -275,9 +275,8 @@ class Simulation:
                 if self._steps[place] == 0:
                     self._begin(place, self._driven(self._robots[place]))
             tables = self._batch.save(which, history=history)
-            recent = [self._sensors[place].recent for place in which if self._sensors]
-            for name in Readings._fields if recent else ():
-                rows = [[getattr(readings, name) for readings in own] for own in recent]
+            for name in Readings._fields if self._sensors else ():
+                rows = [[getattr(one, name) for one in self._sensors[k].recent] for k in which]
                 tables[f"sensors.{name}"] = np.array(rows)
             return States(
                 scenario=self.scenario.name,
