@@ -16,13 +16,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from page import rendered
+from script import run_script
 
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import InputError, SimulationFailure
@@ -178,7 +179,7 @@ def csv(table: pd.DataFrame) -> str:
     return table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
 
 
-def main(chosen: list[str]) -> None:
+def main(chosen: Sequence[str]) -> None:
     """Measures structures and writes the page after each."""
     rows = json.loads(MEASURED.read_text(encoding="utf-8")) if MEASURED.exists() else {}
     rows = {name: row for name, row in rows.items() if name in names()}
@@ -193,7 +194,4 @@ def main(chosen: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"corpus.py: {error}")
+    run_script(main)

@@ -8,17 +8,16 @@ interruption the script continues.
 
 from __future__ import annotations
 
-import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from script import evolved, run_script
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
-from tetra_drake.experiment import evolve
 from tetra_drake.figures.style import save_figure
 from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.results.result import SimulationResult
@@ -64,9 +63,7 @@ def network_table() -> TextTable:
     """
     changes = {"simulation.steady_from": "2 s", "optimizer": CmaEs(), "evolution.trials": TRIALS}
     scenario = load_scenario("rover").with_changes(changes | {"evolution.evaluations": NETWORKS})
-    resume = (SCRATCH / MANIFEST).exists()
-    run = evolve(scenario, SCRATCH, resume=resume, reevaluate=False, report=False)
-    rows = []
+    rows, run = [], evolved(scenario, SCRATCH)
     for trial, row in run.best().set_index("trial").iterrows():
         drift = row["lateral_drift"] / row["distance"]
         turns, way = fixed(row["rolled"] / math.tau, 2), fixed(row["distance"], 2)
@@ -74,7 +71,7 @@ def network_table() -> TextTable:
     return TextTable(["trial", "turns", "way, m", "drift"], rows)
 
 
-def main() -> None:
+def main(_: Sequence[str] = ()) -> None:
     """Draws the picture, and prints the table of open loops."""
     run = load_run(HERE)
     result = simulate(run.scenario, run.best_gait(), record=True)
@@ -83,5 +80,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    main()
+    run_script(main)

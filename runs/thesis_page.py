@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +19,16 @@ import pandas
 import readings
 import xarray
 from analyse import load_analysis
-from claims import claims, load_motion
+from claims import MOTION, claims
 from page import rendered
 from record import load_times
+from script import read_record, run_script
 from settle import difference_of_means, numbers
+from sine import TRIED
 from tables import aspect, best_gait
 from thesis_figures import EVOLVED, mean_fitness, save_figures
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import read_json, write_whole
 from tetra_drake.formatting import fixed, ranged, rounded
@@ -243,7 +244,7 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
         former=trials_numbers(load_run(FORMER)),
-        sines=sines,
+        tried=TRIED,
         sine=lambda name: fixed(sines[name]["distance_in"]),
         setting=setting,
         reached=reached,
@@ -254,11 +255,11 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
         **simulated,
         trials=tables,
         read={name: readings.results(trials) for name, trials in tables.items()},
-        claims=claims(load_motion()).markdown(),
+        claims=read_record(MOTION, claims, "claims.py").markdown(),
     )
 
 
-def main() -> None:
+def main(_: Sequence[str] = ()) -> None:
     """Writes the page and the figures."""
     run = load_run(HERE / "thesis")
     save_figures(run, FIGURES)
@@ -267,7 +268,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except InputError as error:
-        sys.exit(f"thesis_page.py: {error}")
+    run_script(main)

@@ -120,21 +120,6 @@ def test_a_robot_that_fails_ends_its_episode_with_nothing(short):
     assert sum(rewards) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_environments_are_saved_while_one_has_failed(short):
-    many = TensegrityVectorEnv(2, short.with_changes({"cpg.gain": "4e9 N"}))
-    seen, ended = many.reset(seed=0)[0], np.zeros(2, dtype=bool)
-    actions = np.outer([0.0, 1.0], np.ones(many.single_action_space.shape))
-    while not ended.any():
-        seen, _, ended, _, _ = many.step(actions)
-    assert ended.tolist() == [False, True]
-    states = many.save()
-    after = [many.step(0.0 * actions) for _ in range(3)]
-    assert (many.restore(states) == seen).all()
-    for theirs in after:
-        ours = many.step(0.0 * actions)
-        assert (ours[0][0] == theirs[0][0]).all() and (ours[2] == theirs[2]).all()
-
-
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_robots_side_by_side_do_what_environments_of_one_robot_do(short, mode):
     """Also with some robots reset by a mask, and with other modes of beginning again."""

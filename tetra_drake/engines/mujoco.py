@@ -50,10 +50,10 @@ from tetra_drake.robot.equilibrium import (
 )
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import Phase, Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
-from tetra_drake.robot.structure import with_origins
+from tetra_drake.robot.structure import rotated
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.world import World
 
@@ -179,21 +179,23 @@ class _MujocoRobot:
             problem = "is too long for the robot's springs or dampers"
             raise Diverged(time=0.0, reason=f"engine.step, {self._step:g} s, {problem}")
         self._data = mujoco.MjData(self._model)
+        if self._model.nkey:
+            mujoco.mj_resetDataKeyframe(self._model, self._data, 0)
 
     def simulated(self) -> SimulationResult:
         """The result at the end of the simulation. Raises Diverged."""
         pilot, phases = self._driven.pilot, self._driven.robot.phases
-        changes = [(b.begins, b.robot, b.p_BC - a.p_BC) for a, b in itertools.pairwise(phases)]
+        changes = [*itertools.pairwise(phases)]
         action = pilot.acts_after(0.0) if pilot else math.inf
         end, started = self._driven.robot.scenario.simulation.duration, perf_counter()
         try:
-            while (now := min(action, changes[0][0] if changes else end)) < end:
+            while (now := min(action, changes[0][1].begins if changes else end)) < end:
                 self._advance_to(now)
                 if pilot and action <= now + SAME_TIME:
                     signals = signals_of_one(pilot, self._readings())
                     self._before, self._held, self._began = self._held, signals, now
                     action = pilot.acts_after(action)
-                while changes and changes[0][0] <= now + SAME_TIME:
+                while changes and changes[0][1].begins <= now + SAME_TIME:
                     self._become(*changes.pop(0))
             self._advance_to(end)
         except SimulationFailure as failure:
@@ -214,26 +216,25 @@ class _MujocoRobot:
             record=self._record,
         )
 
-    def _become(self, now: float, robot: Robot, p_BC: Array) -> None:
-        """Goes on from now on (s) with another robot in place of this one, whose nodes move on in
-        the same way. The origins of its bodies' frames are at p_BC (bodies, 3) in m in the frames
-        of the old one."""
-        passed = int(np.searchsorted(self._times, now, side="right"))
+    def _become(self, before: Phase, phase: Phase) -> None:
+        """Goes on with the robot of another phase in place of this one; see Phase.entered()."""
+        robot, passed = phase.robot, int(np.searchsorted(self._times, phase.begins, side="right"))
         self._motions.append(self._kept(slice(self._known, passed)))
         self._robot, self._known = robot, passed
         self._make_model()
         self._observer.follow(robot)
         # The last step may end after the event, with a sample.
-        self._state = self._moved(self._state[np.newaxis], p_BC)[0]
-        self._states_kept[passed:] = self._moved(self._states_kept[passed:], p_BC)
+        self._state = self._moved(self._state[np.newaxis], before, phase)[0]
+        self._states_kept[passed:] = self._moved(self._states_kept[passed:], before, phase)
 
-    def _moved(self, states: Array, p_BC: Array) -> Array:
-        """MuJoCo's states (rows, numbers) of the same motion, after the origins of the bodies'
-        frames were moved to p_BC (bodies, 3) in m."""
-        moved, after = states.copy(), with_origins(self._body_states(states), p_BC)
-        bodies = np.arange(len(p_BC))[:, np.newaxis]
+    def _moved(self, states: Array, before: Phase, phase: Phase) -> Array:
+        """MuJoCo's states (rows, numbers) at the beginning of a phase; see Phase.entered()."""
+        old, moved = self._body_states(states), states.copy()
+        after, bodies = phase.entered(old, before), np.arange(len(phase.p_BC))[:, np.newaxis]
         p, v = 7 * bodies + np.arange(3), self._model.nq + 6 * bodies + np.arange(3)
+        back = after[:, 7 * bodies + np.arange(4)] * [1.0, -1.0, -1.0, -1.0]
         moved[:, 1 + p], moved[:, 1 + v] = after[:, 4 + p], after[:, 3 + v]
+        moved[:, 4 + v] += rotated(back, after[:, v] - old[:, v])  # 0 without a push
         return moved
 
     def _advance_to(self, time: float) -> None:
@@ -341,7 +342,7 @@ class _MujocoRobot:
         mujoco, model, data = self._mujoco, self._model, self._mujoco.MjData(self._model)
         ground, structure = self._robot.ground, self._robot.structure
         names = [structure.node_names[node] for node in structure.contacts]
-        contact_of_geom = {model.geom(name).id: i for i, name in enumerate(names)}
+        contact_of_geom = {model.geom(f"foot {name}").id: i for i, name in enumerate(names)}
         sites, wrench = [model.site(name).id for name in names], np.zeros(6)
         ground_forces = np.zeros((len(times), len(names), 3))  # along t1, t2 and n
         for row, state in enumerate(states):

@@ -15,6 +15,7 @@ import numpy as np
 from tetra_drake.scenario.events import Event
 from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.section import value_at
 
 IterationSeed = tuple[int, int, int]
 """Seed of an iteration's draws: seed of the run, number of the trial, number of the iteration."""
@@ -76,9 +77,9 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
 
     The values are not checked: the largest changes were checked when the scenario was loaded.
     """
-    numbers = scenario.numbers()
+    tree = scenario.model_dump()
     factors = [(key, x) for joined, x in draw.factors.items() for key in separate(joined)]
-    changed = scenario.with_numbers({key: x * numbers[key] for key, x in factors})
+    changed = scenario.with_numbers({key: x * value_at(tree, key) for key, x in factors})
     robot, terrain = changed.robot, changed.terrain
     if draw.moves is not None:
         offsets = draw.moves + (robot.offsets or np.zeros_like(draw.moves))
@@ -88,7 +89,7 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
     if draw.sensing_seed is not None and changed.sensing is not None:
         sensing = changed.sensing.model_copy(update={"seed": draw.sensing_seed})
         changed = changed.with_sections(sensing=sensing)
-    events = [*scenario.events, *draw.events]
+    events = [*changed.events, *draw.events]
     return changed.with_sections(robot=robot, terrain=terrain, events=events, disturbances=None)
 
 

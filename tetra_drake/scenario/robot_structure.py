@@ -29,6 +29,7 @@ from tetra_drake.laws.cable import (
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
+from tetra_drake.scenario.start import Start
 from tetra_drake.scenario.structure_graph import (
     Member,
     Pair,
@@ -81,7 +82,7 @@ def _check_name(name: object) -> object:
     refused: they separate the parts of cable names, the parts of keys, and keys."""
     if not isinstance(name, str):
         refuse("", f"found the name {name}, expected a text, such as n{name}")
-    if re.search(r"[\s.,\[\]]", name):
+    if re.search(r"[\s.,\[\]]", name) or not name.isprintable():
         refuse("", f"found the name '{name}', expected one without blanks, dots, commas, brackets")
     return name
 
@@ -161,14 +162,14 @@ class CurveTable(Section):
 class CableGroup(Section):
     """Cables, springs or strings with the same constants. They never push."""
 
+    damping: Damping | None = Field(default=None, ge=0)
+    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
+    default is 1 ms times its stiffness."""
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
     """The nodes that each cable joins. A cable such as [a, b, c] runs over frictionless rings at
     its inner nodes, with one tension."""
     stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
     """Tension per elongation. Only a string or a curve needs none."""
-    damping: Damping | None = Field(default=None, ge=0)
-    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
-    default is 1 ms times its stiffness."""
     string: bool = Field(default=False, exclude_if=operator.not_)
     """True for strings, which hardly stretch. Without a stiffness they get the default of
     `anchor_stiffness`."""
@@ -344,6 +345,8 @@ class StructureFile(RobotSettings):
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
     its anchors."""
+    start: Start | None = Field(default=None, exclude_if=operator.not_)
+    """How the robot is turned and moves at t = 0; at rest if there is none."""
     ignored: list[str] | None = None
     """Settings of an imported file that have no effect, such as friction; noted when the file is
     read."""
@@ -392,6 +395,7 @@ class StructureFile(RobotSettings):
             anchor_damping=self.anchor_time_constant * held,
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
+            start=self.start,
             **cables,
             **self._joints_of(number, body_of),
             given_inertia={
@@ -695,17 +699,20 @@ class ParametricRobot(RobotSettings):
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty."""
+    start: Start | None = Field(default=None, exclude_if=operator.not_)
+    """How the robot is turned and moves at t = 0; at rest if there is none."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
     """Tolerances of numbers of the robot by key."""
 
     def structure(self) -> StructureFile:
-        """The structure for these settings. Its gravity, offsets and tolerances are not used."""
+        """The structure for these settings. Its gravity and tolerances are not used."""
         raise NotImplementedError
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the structure."""
         made = self.structure().blueprint()
-        return dataclasses.replace(made, offsets=np.array(self.offsets or made.offsets))
+        moved = np.array(self.offsets or made.offsets)
+        return dataclasses.replace(made, offsets=moved, start=self.start or made.start)
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Self:

@@ -13,6 +13,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.robot_settings import RobotSettings
+from tetra_drake.scenario.start import Start
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.quantities import (
     Acceleration,
@@ -110,6 +111,8 @@ class Tetrahedra(RobotSettings):
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
+    start: Start | None = Field(default=None, exclude_if=operator.not_)
+    """How the robot is turned and moves at t = 0; at rest if there is none."""
     payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
     """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
@@ -172,6 +175,7 @@ class Tetrahedra(RobotSettings):
             anchor_damping=np.zeros((4 * n, 3)),
             payload=np.array(self.payload or [0.0] * n),
             offsets=np.array(self.offsets or np.zeros((n, 3))),
+            start=self.start,
             cable_names=tuple(f"{name} {cable}" for name in names for cable in CABLES),
             cable_groups=tuple(cable.split()[0] for cable in CABLES) * junctions,
             cable_keys=("cables",) * (len(CABLES) * junctions),

@@ -25,7 +25,7 @@ from tetra_drake.scenario.robot_settings import RobotKind
 from tetra_drake.scenario.sensing import Sensing
 from tetra_drake.scenario.simulation import SimulationSection
 from tetra_drake.settings.refusals import TAG, hint, refuse
-from tetra_drake.settings.section import Kinds, Section, Tree, flattened
+from tetra_drake.settings.section import Kinds, Section, Tree, flattened, parts_of
 from tetra_drake.settings.units import SYSTEMS, Units, current, fitting
 
 EngineT = TypeVar("EngineT", Drake, Compiled, Mujoco)
@@ -73,7 +73,7 @@ class World(Section):
     simulation: SimulationSection
     engine: EngineKind = Drake()
     events: list[Event] = Field(default=[], exclude_if=operator.not_)
-    """Changes of robot or ground during the simulation, such as a cable that breaks."""
+    """Changes of robot or ground during the simulation, such as a cable that breaks; pushes."""
 
     def values(self) -> dict[str, Any]:
         """Values by dotted keys, without the scenario's name. Scenarios with the same values are
@@ -182,7 +182,7 @@ class World(Section):
         They are not checked."""
         changed = self
         for key, number in numbers.items():
-            changed = _with_number(changed, key.split("."), number)
+            changed = _with_number(changed, parts_of(key), number)
         return changed
 
     def numbers(self) -> dict[str, float]:
@@ -236,8 +236,8 @@ class World(Section):
         for i, events in zip(order, up_to_each(self.events), strict=True):
             place, event = f"events[{i}]", self.events[i]
             self._check_time(f"{place}.at", event.at)
-            if not (event.cut or event.lose or event.change):
-                refuse(place, "changes nothing, expected cut, lose or change")
+            if not (event.cut or event.lose or event.change or event.push):
+                refuse(place, "changes nothing, expected cut, lose, change or push")
             for key in event.change:
                 if key not in changeable:
                     found = f"'{key}' is no number of ground or friction"
@@ -255,12 +255,14 @@ class World(Section):
             refuse(key, f"found {time:g} s, expected less than the duration, {end:g} s")
 
 
-def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
-    """A copy of a section or mapping with another number at the path `names`: the parts of a dotted
-    key, such as ["ground", "stiffness"]."""
+def _with_number(value: Any, names: Sequence[Any], number: float) -> Any:
+    """A copy of a section, mapping or list with another number at the path `names`: the parts of a
+    dotted key, such as ["ground", "stiffness"]."""
     if not names:
         return number
     name, *rest = names
     if isinstance(value, Section):
         return value.model_copy(update={name: _with_number(getattr(value, name), rest, number)})
+    if isinstance(value, list):
+        return [*value[:name], _with_number(value[name], rest, number), *value[name + 1 :]]
     return {**value, name: _with_number(value[name], rest, number)}

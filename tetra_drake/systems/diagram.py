@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from types import NoneType
 
@@ -11,7 +12,14 @@ from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.lcm import DrakeLcmParams
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import Frame
-from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    InputPort,
+    OutputPort,
+    System,
+)
 from pydrake.systems.lcm import ApplyLcmBusConfig
 from pydrake.systems.primitives import ConstantVectorSource, PassThrough, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
@@ -50,6 +58,8 @@ def MakeTensegrityDiagram(
     modes: npt.ArrayLike | None = None,
 ) -> Diagram:
     """Diagram of a robot that walks with a gait. Its default context is at the start of the walk.
+    Drake's own Simulator(diagram) and larger diagrams lack the velocities of the start: see
+    MakeSimulator() and SetStart().
 
     The robot may also be driven by a controller, or by signals from outside: without `gait` and
     `controller`, the diagram has an input port `signals`.
@@ -109,8 +119,9 @@ def MakeTensegrityDiagram(
     discrete state, as Drake's Linearize and DirectCollocation need it. So it is right near a state
     only: a node that sticks there keeps its friction where it lifts off.
 
-    Raises InputError if a gait is not of this robot, a port of the controller or of the ground is
-    missing or has another size, or `ground` is given with `modes`.
+    Raises InputError if the scenario has events, or a policy beside a gait; if a gait is not of
+    this robot, a port of the controller or of the ground is missing or has another size, or
+    `ground` is given with `modes`.
     """
     source = "MakeTensegrityDiagram"
     check_type(source, "robot", robot, Robot)
@@ -120,6 +131,11 @@ def MakeTensegrityDiagram(
     check_type(source, "scene_graph", scene_graph, bool)
     check_type(source, "meshcat", meshcat, Meshcat, NoneType)
     scenario, structure = robot.scenario, robot.structure
+    if scenario.events:
+        raise InputError(scenario.name, "events", "found some; only td.simulate() knows them")
+    if scenario.policy is not None and gait is not None:
+        problem = "found one beside a gait; give a SampledController of it in place of the gait"
+        raise InputError(scenario.name, "policy", problem)
     builder = DiagramBuilder()
 
     plant, scene = _AddPlant(builder, scene_graph=scene_graph or meshcat is not None)
@@ -191,7 +207,20 @@ def MakeTensegrityDiagram(
         builder.ExportOutput(scene.get_query_output_port(), "query_object")
     diagram = builder.Build()
     diagram.set_name("tensegrity_robot")
+    if structure.v_WB is not None:
+        own = weakref.ref(diagram)
+        diagram.CreateDefaultContext = lambda: SetStart(
+            own(), Diagram.CreateDefaultContext(own()), robot
+        )
     return diagram
+
+
+def SetStart(diagram: Diagram, context: Context, robot: Robot) -> Context:
+    """Sets the velocities of a robot's start in a context of its diagram, and returns it."""
+    plant = diagram.GetSubsystemByName("plant")
+    velocities = robot.structure.initial_state[plant.num_positions() :]
+    plant.SetVelocities(plant.GetMyMutableContextFromRoot(context), velocities)
+    return context
 
 
 def _AddPlant(

@@ -3,7 +3,8 @@
 Spatial tendons over sites become cables, routed ones where they have more than two sites. A body
 with a free joint becomes a rigid body, with the parts that are welded to it and with MuJoCo's mass,
 centre and inertia. Its sites are nodes. A capsule or a cylinder between two nodes is a strut. Sites
-of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0. Nodes where
+of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0, or in
+the first key frame with velocities, with which the robot then starts. Nodes where
 spheres and capsules touch a level plane are feet, and the plane becomes the ground at z = 0. A free
 robot that is lower is raised to it.
 Actuators of tendons become oscillators. What an actuator exerts at control 0 belongs to its cable,
@@ -27,7 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, escaped
 from tetra_drake.lab.bridges.mjcf_file import compiled_model
 from tetra_drake.lab.bridges.mjcf_forces import (
     actuator_laws,
@@ -107,7 +108,13 @@ class _MjcfTranslation:
 
         obey_flags(model)
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
+        self.key = next(iter(np.flatnonzero(model.key_qvel.any(axis=1)).tolist()), None)
+        """Index of the key frame at which the robot starts; None if it starts at rest."""
+        if self.key is not None:
+            mujoco.mj_resetDataKeyframe(model, self.data, self.key)
         mujoco.mj_kinematics(model, self.data)
+        mujoco.mj_comPos(model, self.data)
+        mujoco.mj_comVel(model, self.data)
         self.nodes: dict[str, np.ndarray] = {}
         """Position (3,) of each node in the world."""
         self.root_of: dict[str, int] = {}
@@ -177,12 +184,15 @@ class _MjcfTranslation:
         struts, strut_names = _grouped(rods, "pairs")
         cables, cable_names = _grouped(itertools.starmap(self._cable, paths.items()), "pairs")
         self._close(joints)
+        bodies = self._bodies(used, dict(zip(strut_names, rods, strict=True)), ground)
+        motions = dict(zip(bodies, map(self._motion, used), strict=True))
         return {
             "nodes": {node: _coordinates(place, ground) for node, place in self.nodes.items()},
             "struts": struts,
             "cables": cables,
             "spheres": _grouped(spheres, "nodes")[0],
-            "bodies": self._bodies(used, dict(zip(strut_names, rods, strict=True)), ground),
+            "bodies": bodies,
+            "start": {} if self.key is None else {"rest": False, "bodies": motions},
             "joints": joints,
             **held,
             "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | held["anchors"],
@@ -193,7 +203,7 @@ class _MjcfTranslation:
 
     def _name(self, kind: str, number: int) -> str:
         """Name of an element, such as a site; its kind and number if it has none."""
-        return getattr(self.model, kind)(number).name or f"{kind}{number}"
+        return escaped(getattr(self.model, kind)(number).name) or f"{kind}{number}"
 
     def _note(self, what: str, kind: str, number: int) -> None:
         self.notes.setdefault(what, []).append(self._name(kind, number))
@@ -322,9 +332,7 @@ class _MjcfTranslation:
         model, data = self.model, self.data
         bodies: Tree = {}
         for root in used:
-            parts = np.flatnonzero(self.roots == root)
-            mass, centres = model.body_mass[parts], self._places(parts, model.body_ipos[parts])
-            centre = mass @ centres / mass.sum()
+            parts, mass, centres, centre = self._masses(root)
             inertia = np.zeros((3, 3))
             for part in parts:
                 axes = data.ximat[part].reshape(3, 3)
@@ -344,6 +352,23 @@ class _MjcfTranslation:
                 "inertia": [f"{moment:.15g} kg*m^2" for moment in moments],
             }
         return bodies
+
+    def _masses(self, root: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Parts of a rigid body, their masses (parts,) and centres (parts, 3), and its centre."""
+        parts = np.flatnonzero(self.roots == root)
+        mass = self.model.body_mass[parts]
+        centres = self._places(parts, self.model.body_ipos[parts])
+        return parts, mass, centres, mass @ centres / mass.sum()
+
+    def _motion(self, root: int) -> Tree:
+        """Velocity of the centre of mass, and spin, of a rigid body at the start."""
+        spin, velocity = np.split(self.data.cvel[root], 2)
+        arm = self._masses(root)[-1] - self.data.subtree_com[self.model.body_rootid[root]]
+        along = velocity + np.cross(spin, arm)
+        return {
+            "velocity": [_text(x, "m/s") for x in along.tolist()],
+            "spin": [_text(x, "rad/s") for x in spin.tolist()],
+        }
 
     def _joints(self, connects: list[int]) -> tuple[Tree, Tree]:
         """Joints, from connects of two bodies, and anchors, from connects with the world."""
@@ -484,7 +509,7 @@ class _MjcfTranslation:
         yield "the armature of actuators, left out", "actuator", model.actuator_armature
         yield "mocap bodies, read as fixed", "body", model.body_mocapid >= 0
         yield "plug-ins, left out", "body", model.body_plugin >= 0
-        yield "key frames, left out", "key", np.ones(model.nkey)
+        yield "key frames, left out", "key", np.arange(model.nkey) != self.key
         yield "flexible parts, left out", "flex", np.ones(model.nflex)
 
 

@@ -301,13 +301,14 @@ def structure_text(study: EquilibriumStudy) -> str:
 
 
 def _faults(study: EquilibriumStudy) -> list[str]:
-    """Warnings about a robot at rest: what gives way, such as its ground, nodes below ground that
-    cannot touch it, and struts that overlap."""
+    """Warnings about a robot at rest: that it starts otherwise, what gives way, such as its ground,
+    nodes below ground that cannot touch it, and struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
     allowed = START_DEPTH * structure.scale + robot.weight / robot.scenario.ground.stiffness
     remarks = [sinking_remark(robot), yielding_remark(robot)]
     remarks.append(overload_remark(robot, study.cables["tension"].to_numpy()))
-    lines = [sentence(told) for told in remarks if told]
+    lines = ["Its `start` is not at rest."] if structure.start else []
+    lines += [sentence(told) for told in remarks if told]
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
         depths = [f"{node} ({units.shown(-z, 'm')})" for node, z in low.items()]
