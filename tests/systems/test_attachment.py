@@ -102,7 +102,7 @@ def test_a_force_on_a_slack_cable_is_told_once(actuation):
         return
     assert tension == 3.0
     (only,) = told
-    assert f"'{loose.name}' is slack, and its signal pulls it with 3 N" in str(only.message)
+    assert f"'{loose.name}' is slack, and its signal pulls with 3 N" in str(only.message)
     assert only.category is RuntimeWarning
 
 

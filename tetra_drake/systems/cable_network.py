@@ -181,9 +181,7 @@ class CableNetwork(ConvertibleSystem):
         pulled = np.where(is_slack, table[:, cable.TENSION], 0.0)
         if pulled.any():
             most, self.warns = int(pulled.argmax()), False
-            told = (
-                f"'{self._names[most]}' is slack, and its signal pulls it with {pulled[most]:.3g} N"
-            )
+            told = f"'{self._names[most]}' is slack, and its signal pulls with {pulled[most]:.3g} N"
             warnings.warn(f"{told}; see actuation of AddCables", RuntimeWarning, stacklevel=2)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
