@@ -2,6 +2,7 @@
 
 import math
 import shutil
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -16,8 +17,9 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.gait_file import load_gait, save_gait
 from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.policies import driven_names
+from tetra_drake.scenario.policies import DrivenRobots, PolicyKind, driven_names
 from tetra_drake.scenario.policy_kinds import imported_function
 
 DRAKE = "!Drake {scheme: runge_kutta3, accuracy: 1e-4, max_step: 2 ms}"
@@ -192,6 +194,36 @@ def test_a_wrong_policy_is_refused(policy, expected):
         scenario = brief(policy=policy)
         simulate(scenario, td.seeded_gait(scenario))
     assert expected in str(error.value) and "\n" not in str(error.value)
+
+
+class Given(PolicyKind):
+    """Policy whose answer and bounds are settings of the class."""
+
+    answer: ClassVar[Any] = None
+    bounds: ClassVar[tuple[float, float]] = 0.0, 1.0
+
+    def parameters(self, blueprint: Blueprint) -> dict[str, tuple[float, float]]:
+        return {"p": self.bounds}
+
+    def signals(self, robots: DrivenRobots, readings: Any, values: np.ndarray) -> Any:
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    "answer", [None, "1", np.zeros((1, 5)), np.zeros((6, 1)), [[math.nan] * 6]]
+)
+def test_signals_of_a_kind_of_policy_are_numbers_for_each_cable(answer, monkeypatch, refused):
+    monkeypatch.setattr(Given, "answer", answer)
+    scenario = brief().with_sections(policy=Given())
+    with refused("!Given", "signals" + "[0, 0]" * isinstance(answer, list), "shape (1, 6)"):
+        simulate(scenario, Gait("", {"p": 0.0}))
+
+
+@pytest.mark.parametrize("bounds", [(1.0, 0.0), (0.0, math.nan), (-math.inf, 0.0)])
+def test_bounds_of_a_kind_of_policy_are_finite_and_ascend(bounds, monkeypatch, refused):
+    monkeypatch.setattr(Given, "bounds", bounds)
+    with refused("!Given", "p", "the least first"):
+        td.seeded_gait(brief().with_sections(policy=Given()))
 
 
 def test_what_does_not_go_with_a_policy_is_refused(tmp_path):

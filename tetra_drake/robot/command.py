@@ -200,7 +200,9 @@ def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
         arrays = [pilot.robots[2:] for pilot in some]
         together = DrivenRobots(*some[0].robots[:2], *_stacked(arrays))
         values = np.array([pilot.values for pilot in some])
-        signals[rows] = some[0].law(together, readings.rows(rows), values)
+        given, shape = some[0].law(together, readings.rows(rows), values), signals[rows].shape
+        source = some[0].source
+        signals[rows] = checked_numbers(given, shape, source=source, key="signals", finite=True)
     return signals
 
 

@@ -33,6 +33,7 @@ from tetra_drake.scenario.structure_graph import (
     with_joints,
 )
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
+from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.quantities import (
     Acceleration,
     Density,
@@ -627,7 +628,10 @@ class ParametricRobot(RobotSettings):
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the structure."""
-        made = self.structure().blueprint()
+        structure = self.structure()
+        if not isinstance(structure, StructureFile):
+            refuse("", f"{origin(self)}: structure() gave {structure!r:.40}, expected a Structure")
+        made = structure.blueprint()
         return dataclasses.replace(made, offsets=np.array(self.offsets or made.offsets))
 
     @pydantic.model_validator(mode="after")
