@@ -259,6 +259,9 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
     monitor replaces it.
     """
+    check_type("MakeSimulator", "diagram", diagram, Diagram)
+    check_type("MakeSimulator", "robot", robot, Robot)
+    check_type("MakeSimulator", "settings", settings, Drake)
     steps = _Steps.of(robot, settings)
     simulator = _make_simulator(diagram, robot, steps)
     aimer = _StepAimer(diagram, simulator, steps, _Work(simulator))

@@ -39,6 +39,7 @@ from tetra_drake.scenario.structure_graph import (
     with_joints,
 )
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
+from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.quantities import (
     Acceleration,
     Damping,
@@ -710,7 +711,10 @@ class ParametricRobot(RobotSettings):
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the structure."""
-        made = self.structure().blueprint()
+        structure = self.structure()
+        if not isinstance(structure, StructureFile):
+            refuse("", f"{origin(self)}: structure() gave {structure!r:.40}, expected a Structure")
+        made = structure.blueprint()
         moved = np.array(self.offsets or made.offsets)
         return dataclasses.replace(made, offsets=moved, start=self.start or made.start)
 
