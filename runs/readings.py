@@ -167,6 +167,8 @@ def _checked(record: Record) -> Record:
 def tables_of(record: Record) -> dict[str, pandas.DataFrame]:
     """Tables of the trials by reading, the nearest to the thesis first."""
     tables = {name: pandas.DataFrame(trials) for name, trials in record.items()}
+    for table in tables.values():
+        table["rise"] = 100.0 * (table["best_in"] / table["initial_best_in"] - 1.0)
     return dict(sorted(tables.items(), key=lambda item: factor(item[1])))
 
 
