@@ -355,6 +355,8 @@ def default_scheme(robot: Robot) -> str:
         return "radau3"
     unactuated = Unactuated(robot.model)
     damping = damping_at_rest(unactuated, robot.structure.initial_state)
+    if not damping.any():
+        return "runge_kutta3"
     matrices = csc_array(damping), csc_array(mass_matrix(unactuated))
     rate = eigsh(matrices[0], 1, matrices[1], which="LA", return_eigenvectors=False)[0]
     return "runge_kutta3" if rate < _RATE_PER_SQUARE * bodies**2 else "radau3"
