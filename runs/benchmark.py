@@ -4,14 +4,13 @@
 
 Prints tables in Markdown for tetra_drake/engines/speed.md. The gaits are random gaits with seeds
 0, 1 ... on the scenario `thesis`; what is measured is in benchmark.yaml. Without names, the tables
-`engines`, `batches`, `grounds` and `controlled` are printed:
+`engines`, `batches` and `controlled` are printed:
 
-    engines        speed and error of the engines
+    engines        speed and error of the engines, on two grounds
     integrators    speed and error for settings of the diagram; takes longest
     schemes        all integrators of Drake on the diagrams of `thesis` and `six_bar`
     candidates     time for another robot: a diagram for each, or one diagram with parameters
     batches        speed of the compiled engine with many gaits at a time
-    grounds        speed by ground and network
     controlled     speed of robots that are controlled, on all cores
     sizes          CPU time of rows of tetrahedra, masts and lattices by the number of bodies, on
                    the compiled engine and Drake
@@ -93,14 +92,16 @@ def exact_in(scenario: Scenario, engine: str) -> np.ndarray:
 
 
 def engines_table(scenario: Scenario, table: str) -> TextTable:
-    """Table of the speed and error of engines."""
-    rows = []
-    for engine in GIVEN[table]:
+    """Table of the speed and error of engines, by ground."""
+    rows, grounds = [], {"": scenario}
+    for name, changes in GIVEN["grounds"].items():
+        grounds[name] = scenario.with_changes(changes)
+    for ground, engine in GIVEN[table]:
         is_mujoco = engine.startswith("!Mujoco")
         if is_mujoco and not installed():
             continue
-        exact = exact_in(scenario, GIVEN["converged_mujoco" if is_mujoco else "converged"])
-        measured = scenario.with_changes({"engine": engine})
+        exact = exact_in(grounds[ground], GIVEN["converged_mujoco" if is_mujoco else "converged"])
+        measured = grounds[ground].with_changes({"engine": engine})
         gaits = random_gaits(measured, GIVEN["gaits"])
         simulate(measured.with_changes(GIVEN["short"]), gaits[0])
         started = time.perf_counter()
@@ -109,9 +110,9 @@ def engines_table(scenario: Scenario, table: str) -> TextTable:
         errors = np.abs(distances_in(results) - exact)
         evaluations = np.mean([each.integrator.derivative_evaluations for each in results])
         row = [fixed(np.median(errors), 3), fixed(errors.max(), 3), f"{evaluations:,.0f}"]
-        rows.append([f"`{engine}`", f"{speed:.3g}", *row])
-    headings = ["engine", "times real time per core", "median error, in", "worst error, in"]
-    return TextTable([*headings, "evaluations per gait"], rows)
+        rows.append([f"`{engine}`", ground, f"{speed:.3g}", *row])
+    headings = ["engine", "ground", "times real time per core", "median error, in"]
+    return TextTable([*headings, "worst error, in", "evaluations per gait"], rows, (0, 1))
 
 
 def median_times(*runs: Callable[[], object]) -> np.ndarray:
@@ -128,33 +129,17 @@ def median_times(*runs: Callable[[], object]) -> np.ndarray:
     return np.median(rounds[1:], axis=0)
 
 
-def speeds(*batches: tuple[Scenario, int], cores: int = 1) -> np.ndarray:
-    """Speeds (batches,) of random gaits that are simulated together, as multiples of real time. A
-    batch is a scenario and a number of gaits."""
-    walks = [partial(walk, each, gaits, cores=cores) for each, gaits in batches]
-    simulated = [gaits * each.simulation.duration for each, gaits in batches]
-    return np.array(simulated) / median_times(*walks)
-
-
 def batches_table(scenario: Scenario) -> TextTable:
-    """Table of the compiled engine's speed with many gaits at a time, on one core and on all."""
-    compiled, sizes, rows = scenario.on_engine("compiled"), GIVEN["batches"], []
+    """Table of the compiled engine's speed with many gaits at a time, on one core and on all, as
+    multiples of real time."""
+    compiled, sizes, rows = scenario.on_engine("compiled"), np.array(GIVEN["batches"]), []
     for cores in sorted({1, available_cores()}):
-        batches = [(compiled, gaits) for gaits in sizes if gaits >= cores]
-        too_few = [""] * (len(sizes) - len(batches))
-        rows.append([str(cores), *too_few, *(f"{x:,.0f}" for x in speeds(*batches, cores=cores))])
+        some = sizes[sizes >= cores]
+        times = median_times(*(partial(walk, compiled, gaits, cores=cores) for gaits in some))
+        speeds = some * compiled.simulation.duration / times
+        too_few = [""] * (len(sizes) - len(some))
+        rows.append([str(cores), *too_few, *(f"{speed:,.0f}" for speed in speeds)])
     return TextTable(["cores/gaits", *map(str, sizes)], rows)
-
-
-def grounds_table(scenario: Scenario) -> TextTable:
-    """Table of the speed on one core by ground and network."""
-    rows, count = [], GIVEN["ground_batch"]
-    for name, changes in GIVEN["grounds"].items():
-        changed = scenario.with_changes(changes)
-        compiled, drake = (changed.on_engine(engine) for engine in ("compiled", "drake"))
-        alone, many, on_diagram = speeds((compiled, 1), (compiled, count), (drake, 1))
-        rows.append([name, f"{alone:,.0f}", f"{many:,.0f}", fixed(on_diagram)])
-    return TextTable(["ground", "compiled, one gait", f"compiled, {count} gaits", "drake"], rows)
 
 
 def held_gait(scenario: Scenario, gait: Gait) -> Command:
@@ -391,14 +376,13 @@ def candidates_table(scenario: Scenario) -> TextTable:
 TABLES: dict[str, Callable[[Scenario], TextTable]] = {
     "engines": partial(engines_table, table="engines"),
     "batches": batches_table,
-    "grounds": grounds_table,
     "controlled": controlled_table,
     "integrators": partial(engines_table, table="integrators"),
     "sizes": sizes_table,
     "schemes": schemes_table,
     "candidates": candidates_table,
 }
-USUAL = [*TABLES][:4]
+USUAL = [*TABLES][:3]
 """Tables that are printed without names."""
 
 

@@ -36,10 +36,11 @@ from measured_robots import (
     wound_up,
 )
 from scipy.optimize import brentq, linear_sum_assignment
+from script import read_settings
 
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_json, read_text, write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.lab.predict.predict import drawn_scenarios, errors_of, intervals
 from tetra_drake.lab.predict.variates import Variate, variates_of
 from tetra_drake.lab.study.equilibrium import study_equilibrium
@@ -49,7 +50,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.struts import axial_forces
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario, scenario_of
-from tetra_drake.scenario.yaml_text import parse_yaml
 
 KEPT = HERE / "predictions"
 """Folder of the finished cases. A case whose file is there is not computed again."""
@@ -59,7 +59,7 @@ BUCKLING, LENGTH, CABLE = 10.66e3, 2.9998, 0.502
 """Buckling load (N) and length (m) of a tube of the simplex, and mass (kg) of a cable."""
 SAG = 0.7e-3
 """Sag (m) of an unloaded tube under its weight."""
-_GIVEN = parse_yaml(read_text(HERE / "cases.yaml", "cases"), "cases.yaml")
+_GIVEN = read_settings(HERE / "cases.yaml")
 CASES, ELEMENTS = _GIVEN["cases"], _GIVEN["elements"]
 """The cases by the names of their files in KEPT, and the simplex's cables by their names there."""
 KINDS = {word: kind for kind, words in _GIVEN["kinds"].items() for word in words}
@@ -254,7 +254,7 @@ def simplex_tests(
 ) -> Values:
     """Heights and forces of the simplex under loads (kN) per upper node, or their means; or its
     forces as one tube is lengthened, in mm from the self-stress (kN) on."""
-    _, base, wanted = prestressed(scenario, unknown, self_stress)
+    base, wanted = prestressed(scenario, unknown, self_stress)[1:]
     tests = {f"{load:.2f} kN": (load * (1.0 + unknown["load"]), 0.0) for load in loads}
     tests |= {f"{by:+g} mm": (0.0, by + unknown["lengthening"]) for by in lengthenings}
     values: Values = {}
@@ -398,7 +398,9 @@ def measured_rise(share: float) -> list[float]:
 
 def jumps_measured() -> Values:
     """Middles of the measured ranges of the jumper's rises."""
-    return {f"rise at {100.0 * share:.0f} %": np.mean(measured_rise(share)) for share in JUMPS}
+    return {
+        f"rise at {100.0 * share:.0f} %": float(np.mean(measured_rise(share))) for share in JUMPS
+    }
 
 
 def standing(name: str) -> Scenario:
@@ -483,7 +485,9 @@ def laika_lifts(scenario: Scenario, unknown: Unknowns, feet: Mapping[str, Any]) 
             if name in ("HL", "HR"):
                 like, pulled = ("HL", unknown["pulled in"]) if name[1] == side else ("HR", 0.0)
             a, b = (np.array(structure.nodes[node]) for node in group.pairs[0])
-            stiffness, tension = structure.cables[like].stiffness, structure.cables[like].tension
+            stiffness, tension = (
+                getattr(structure.cables[like], key) for key in ("stiffness", "tension")
+            )
             free = float(np.linalg.norm(a - b)) - tension / stiffness - pulled / 1e3
             law = {"stiffness": f"{stiffness!r} N/m", "tension": None, "free_length": f"{free!r} m"}
             changes |= {f"robot.cables.{name}.{key}": value for key, value in law.items()}

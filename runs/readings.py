@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -51,23 +51,13 @@ class Reading:
     """Settings of SteadyState that end them."""
 
 
-def load_readings(file: Path) -> dict[str, dict[str, Reading]]:
-    """The readings of a file by part and name."""
-    return {
-        part: {name: Reading(**given) for name, given in readings.items()}
-        for part, readings in read_settings(file).items()
-    }
-
-
-_GIVEN = load_readings(HERE / "readings.yaml")
-_SLIPPING = {
-    f"slip-{name}": replace(reading, about=f"slips; {reading.about}", base="thesis-reversal")
-    for name, reading in _GIVEN["slips"].items()
-}
-_REVERSAL = Reading("a node slips until its velocity changes sign", run="thesis-reversal")
-READINGS = _GIVEN["as-written"] | {"reversal": _REVERSAL} | _SLIPPING
-ALL = READINGS | _GIVEN["future"]
-COARSE, FIXED = (_SLIPPING[f"slip-{name}"].changes["engine"] for name in ("coarse", "fixed"))
+READINGS, FUTURE = (
+    {name: Reading(**given) for name, given in part.items()}
+    for part in read_settings(HERE / "readings.yaml").values()
+)
+"""Readings by name, and variations that the thesis proposes; see the file."""
+ALL = READINGS | FUTURE
+COARSE, FIXED = (READINGS[f"slip-{name}"].changes["engine"] for name in ("coarse", "fixed"))
 """Engines of two readings."""
 
 
@@ -177,6 +167,8 @@ def _checked(record: Record) -> Record:
 def tables_of(record: Record) -> dict[str, pandas.DataFrame]:
     """Tables of the trials by reading, the nearest to the thesis first."""
     tables = {name: pandas.DataFrame(trials) for name, trials in record.items()}
+    for table in tables.values():
+        table["rise"] = 100.0 * (table["best_in"] / table["initial_best_in"] - 1.0)
     return dict(sorted(tables.items(), key=lambda item: factor(item[1])))
 
 

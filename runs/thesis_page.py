@@ -26,7 +26,7 @@ from script import read_record, run_script
 from settle import difference_of_means, numbers
 from sine import TRIED
 from tables import aspect, best_gait
-from thesis_figures import EVOLVED, mean_fitness, save_figures
+from thesis_figures import save_figures
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run, load_run
@@ -103,14 +103,10 @@ def weights_pattern(run: Run) -> dict[str, str]:
 
 
 def trials_numbers(run: Run) -> dict[str, Any]:
-    """Numbers of the thesis's chapter 3 from a run, as text."""
-    initial, best, fitness = run.initial(), run.best().set_index("trial"), mean_fitness(run)
-    fittest = initial.loc[initial.groupby("trial")["fitness"].idxmax()].set_index("trial")
-    begun, ended = initial.groupby("trial")["distance_in"].max(), best["distance_in"]
-    trial, last = int(best["fitness"].idxmax()), fitness.ffill().iloc[-1]
-    rise = 100.0 * (ended / fittest["distance_in"] - 1.0)
-    duration, robot = run.scenario.simulation.duration, Robot.of(run.scenario)
-    iterations = fitness.count() - 1
+    """Numbers of the thesis's chapter 3 from a run, as text; readings.py has the rest."""
+    best, duration = run.best().set_index("trial"), run.scenario.simulation.duration
+    trial, robot = int(best["fitness"].idxmax()), Robot.of(run.scenario)
+    iterations = run.iterations.groupby("trial")["iteration"].max()
     wall_time = load_times(HERE)[run.directory.name]["evolution"]["wall_s"]
     seconds = wall_time / iterations.sum()
     times = np.arange(STEADY, duration, run.scenario.simulation.sample_period)
@@ -119,25 +115,11 @@ def trials_numbers(run: Run) -> dict[str, Any]:
     pairs = pandas.DataFrame({t: two_best(run, t) for t in best.index}).T
     return {
         "trial": trial,
-        "begun": over_trials(begun),
-        "least_initial": fixed(initial["distance_in"].min()),
-        "backward": f"{100.0 * (initial['distance'] < 0.0).mean():.0f} %",
-        "ended": over_trials(ended),
-        "farthest": fixed(ended[trial]),
-        "farther": int((ended > EVOLVED).sum()),
-        "rise": over_trials(rise, 0),
-        "rise_of_means": fixed(100.0 * (ended.mean() / begun.mean() - 1.0), 0),
-        "rise_of_best": fixed(rise[trial], 0),
-        "iterations": over_trials(iterations, 0),
+        "least_initial": fixed(run.initial()["distance_in"].min()),
         "levelled": sum("levelled" in str(status.stop) for status in run.statuses),
-        "mean_begun": over_trials(fitness.iloc[0]),
-        "mean_ended": over_trials(last),
-        "rising": int((last > fitness.iloc[0]).sum()),
-        "last_rise": fixed(last[trial] - fitness[trial].dropna().iloc[-101]),
         "seconds": rounded(seconds, 2),
         "faster": f"{round(2.0 * duration / seconds, -2):,.0f}",
         "trial_seconds": over_trials(seconds * iterations, 0),
-        "tau": over_trials(best["tau_A"], 3),
         "hertz": over_trials(hertz),
         "hertz_of_best": fixed(hertz[trial]),
         "swing": fixed(np.ptp(signals[trial]) / POUND_FORCE),
@@ -192,12 +174,12 @@ def motions(run: Run, engine: str) -> list[xarray.DataArray]:
 def motion_errors(run: Run, engines: Iterable[str]) -> list[str]:
     """Greatest error (in) of a node's place on each engine beside a fine one, over the best gaits
     of a run."""
-    exact, texts = motions(run, FINE), []
-    for engine in engines:
-        pairs = zip(motions(run, engine), exact, strict=True)
-        errors = [float(abs(rough - fine).max()) / INCH for rough, fine in pairs]
-        texts.append(over_trials(pandas.Series(errors)))
-    return texts
+    exact, *others = (motions(run, engine) for engine in (FINE, *engines))
+    errors = [
+        [float(abs(a - b).max()) / INCH for a, b in zip(each, exact, strict=True)]
+        for each in others
+    ]
+    return [over_trials(pandas.Series(each)) for each in errors]
 
 
 def widths(*pictures: str) -> list[int]:
@@ -251,6 +233,7 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
         apart=apart,
         widths=widths,
         number=fixed,
+        over=over_trials,
         readings=readings,
         **simulated,
         trials=tables,

@@ -145,7 +145,7 @@ def brick(times: Array, case: Case) -> Array:
 
 
 def dzhanibekov(times: Array, case: Case) -> Array:
-    return turning(BRICK, np.array([0, 10.0, 0.01]), np.array([0, 0.05, 0]), times)[:, 1]
+    return turning(BRICK, np.array([0, 10.0, 0.1]), np.array([0, 0.05, 0]), times)[:, 1]
 
 
 def projectile(times: Array, case: Case) -> Array:
@@ -362,7 +362,7 @@ def flyball(times: Array, case: Case) -> Array:
 
 def at_rest(**tree: Any) -> EquilibriumStudy:
     """A structure at rest. It has a slack cord besides, and no ground."""
-    given = {"unit": "m", "gravity": 0, "struts": {}, "anchors": {}} | tree
+    given: dict[str, Any] = {"unit": "m", "gravity": 0, "struts": {}, "anchors": {}} | tree
     given["struts"] = {k: BAR | {"density": "1200 kg/m^3"} | s for k, s in given["struts"].items()}
     return study_equilibrium(robot_of_structure(StructureFile.from_tree(given, "made"), "made"))
 

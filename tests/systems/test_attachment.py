@@ -88,7 +88,6 @@ def test_a_force_on_a_slack_cable_is_told_once(actuation):
     own = system.GetMyMutableContextFromRoot(context)
     signal = system.GetInputPort("signals")
     signal.FixValue(own, [0.0])
-    lengths = system.GetOutputPort("lengths").Eval(own)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         system.GetOutputPort("tensions").Eval(own)
@@ -103,8 +102,8 @@ def test_a_force_on_a_slack_cable_is_told_once(actuation):
         return
     assert tension == 3.0
     (only,) = told
-    assert f"'{loose.name}' is slack by {1e3 * (2.0 - lengths[0]):.3g} mm" in str(only.message)
-    assert "3 N" in str(only.message) and only.category is RuntimeWarning
+    assert f"'{loose.name}' is slack, and its signal pulls with 3 N" in str(only.message)
+    assert only.category is RuntimeWarning
 
 
 def test_a_hinged_rod_sinks_into_the_ground_by_half_its_weight_over_the_stiffness():

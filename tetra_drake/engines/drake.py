@@ -259,6 +259,9 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
     monitor replaces it.
     """
+    check_type("MakeSimulator", "diagram", diagram, Diagram)
+    check_type("MakeSimulator", "robot", robot, Robot)
+    check_type("MakeSimulator", "settings", settings, Drake)
     steps = _Steps.of(robot, settings)
     simulator = _make_simulator(diagram, robot, steps)
     aimer = _StepAimer(diagram, simulator, steps, _Work(simulator))
@@ -352,6 +355,8 @@ def default_scheme(robot: Robot) -> str:
         return "radau3"
     unactuated = Unactuated(robot.model)
     damping = damping_at_rest(unactuated, robot.structure.initial_state)
+    if not damping.any():
+        return "runge_kutta3"
     matrices = csc_array(damping), csc_array(mass_matrix(unactuated))
     rate = eigsh(matrices[0], 1, matrices[1], which="LA", return_eigenvectors=False)[0]
     return "runge_kutta3" if rate < _RATE_PER_SQUARE * bodies**2 else "radau3"

@@ -39,6 +39,7 @@ from tetra_drake.scenario.structure_graph import (
     with_joints,
 )
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
+from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.quantities import (
     Acceleration,
     Damping,
@@ -203,14 +204,13 @@ class CableGroup(Section):
             refuse("free_length", f"found {found}, expected one of free_length and tension")
         if self.curve and (self.stiffness or self.quadratic or self.cubic or self.string):
             refuse("curve", "found another law beside it, expected the curve alone")
-        if self.stiffness is None and not (self.curve or self.string):
-            refuse("stiffness", "is missing; give it")
         if self.string and (self.initial_tension or self.quadratic or self.cubic):
             refuse("string", "found a law of a spring beside it, expected stiffness at most")
-        if self.string and self.stiffness is None and self.free_length is None:
-            refuse("free_length", "is missing; give it for a string without stiffness")
-        if self.damping is None and not self.string:
-            refuse("damping", "is missing; give it")
+        needed = {"stiffness": not (self.curve or self.string), "damping": not self.string}
+        needed |= {"free_length": self.string and self.stiffness is None}
+        for key, is_needed in needed.items():
+            if is_needed and getattr(self, key) is None:
+                refuse(key, "is missing; give it")
         for name, factors in self.factors.items():
             if len(factors) != len(self.pairs) or getattr(self, name) is None:
                 found = f"found {len(factors)} factors of {name}"
@@ -702,7 +702,10 @@ class ParametricRobot(RobotSettings):
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the structure."""
-        made = self.structure().blueprint()
+        structure = self.structure()
+        if not isinstance(structure, StructureFile):
+            refuse("", f"{origin(self)}: structure() gave {structure!r:.40}, expected a Structure")
+        made = structure.blueprint()
         moved = np.array(self.offsets or made.offsets)
         return dataclasses.replace(made, offsets=moved, start=self.start or made.start)
 

@@ -241,6 +241,10 @@ class Kinds:
             if base in kind.__mro__ and (kind.tag in tags or kind.tag != name):
                 raise refusal(entry, f"found !{kind.tag}, expected !{name}, which no kind here has")
             if base in kind.__mro__:
+                try:
+                    kind.model_rebuild()
+                except (NameError, pydantic.PydanticUserError) as error:
+                    raise refusal(entry, f"cannot be built: {error}") from error
                 yield kind
 
 

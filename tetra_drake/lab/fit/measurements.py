@@ -218,7 +218,7 @@ class MotionCapture(_Placed):
 
         from tetra_drake.lab.fit.placement import nearest
 
-        seen, first, last = _by_node(log), *log.index[[0, -1]]
+        seen, first, last = _by_node(log), float(log.index[0]), float(log.index[-1])
         if isinstance(outcome, SimulationFailure):
             count = np.isfinite(seen).sum() + seen[0].size * bool(self.marker_offset)
             return Prediction(np.full(count, np.nan))
@@ -263,7 +263,7 @@ class MotionCapture(_Placed):
             angles = Rotation.from_matrix(turn).as_euler("XYZ", degrees=True)
             angle = ", ".join(f"{fixed(each)} deg" for each in angles)
             notes.append(f"the frame has origin: [{place}], turn: [{angle}]")
-        offsets = found.offsets if self.marker_offset else []
+        offsets = found.offsets if self.marker_offset else np.zeros((0, 3))
         values = np.append(found.p[np.isfinite(seen)], offsets)
         return Prediction(values, found.shift + float(first), notes)
 

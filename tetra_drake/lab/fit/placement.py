@@ -20,7 +20,7 @@ EXACT = 1e-10
 """Relative tolerance of the refinement, in the sum of squares and in the unknowns."""
 
 Frame = tuple[np.ndarray, np.ndarray]
-Motion = Callable[[float], np.ndarray]
+OverTime = Callable[[float], np.ndarray]
 """Something that moves, at the times of a log for an offset (s) of its clock."""
 
 
@@ -45,8 +45,8 @@ def aligned(p: np.ndarray, seen: np.ndarray) -> Frame:
 
 
 def nearest(
-    places: Motion,
-    axes: Motion,
+    places: OverTime,
+    axes: OverTime,
     seen: np.ndarray,
     *,
     clock: tuple[float, float],

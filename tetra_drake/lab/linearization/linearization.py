@@ -161,6 +161,7 @@ class Linearization:
     def deviation(self, readings: Readings) -> np.ndarray:
         """States x (states,) of a robot with these readings: its deviations from `state`. Raises
         InputError if the actuators have states, which are not among the readings."""
+        check_type("deviation", "readings", readings, Readings)
         self._check_readable()
         structure, count = self.robot.structure, 7 * len(self.robot.structure.bodies)
         now = bodies_state(readings, structure)
