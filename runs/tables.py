@@ -4,7 +4,7 @@
 
 Each table is in a Markdown file between two lines:
 
-    <!-- table NAME: made by runs/tables.py -->
+    <!-- table NAME: runs/tables.py -->
     <!-- end -->
 """
 
@@ -57,7 +57,7 @@ FAR = 5.0
 """Distance (in) from which a gait walks; of less, a difference in percent says little."""
 
 _TABLE = re.compile(
-    r"(?P<begin><!-- table (?P<name>\S+): made by runs/tables.py -->)\n.*?<!-- end -->", re.DOTALL
+    r"(?P<begin><!-- table (?P<name>\S+): runs/tables.py -->)\n.*?<!-- end -->", re.DOTALL
 )
 
 

@@ -138,8 +138,8 @@ class CpgKind(Section):
     start_up: Time = Field(default=1.25, ge=0)
     """Time until which the cables are not actuated."""
     signals: Literal["listing", "live"] = "live"
-    """How signals are computed. `listing`: before the simulation, by forward Euler, as the thesis's
-    code does. `live`: integrated with the robot."""
+    """How signals are computed: `listing`, before the simulation by forward Euler, as the thesis's
+    code does; or `live`, integrated with the robot."""
     listing_step: Time = Field(default=5e-4, ge=1e-6)
     """Time step of signals that are computed beforehand."""
     feedback: list[Pathway] = Field(default=[])

@@ -254,8 +254,8 @@ class TalliedMetrics:
         "N", "without the start; a cable can pull a winch backward", total("effort.peak_force")
     )
     """Greatest load of an actuator in the steady stretch: the tension of its cable, without the
-    cable's own spring beside an actuator with limits. It exceeds `max_force` of a winch whose cable
-    is stretched faster than the stalled winch pays out."""
+    cable's own spring beside an actuator with limits. It exceeds `max_force` of a winch that is
+    pulled backward."""
     mean_actuator_force: float = metric("N", "of all driven cables", mean("impulse"), is_cost=True)
     """Mean load of the actuators in the steady stretch."""
     peak_actuator_speed: float = greatest("m/s", "without the start", total("effort.peak_speed"))

@@ -65,7 +65,7 @@ class Disturbances(Section):
     Keys joined by commas get one factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)
     """Largest displacement of each body at t = 0 along x, y and up, as a share of the spacing of
-    tetrahedra, or of a structure's shortest strut."""
+    tetrahedra, or of the shortest strut."""
     cuts: Cuts | None = Field(default=None, exclude_if=operator.not_)
     """Cables that break in each draw."""
     tail: float = Field(default=1.0, gt=0, le=1)

@@ -135,7 +135,7 @@ def _value(node: Tree) -> str:
     words = unit or node.get("format") or _WORDS.get(str(node.get("type")), str(node.get("type")))
     if "items" in node:
         item = _value(node["items"])
-        item = f"({item})" if re.search(r",| or |×", item) else item
+        item = f"({item})" if re.search(r"[,×<>≤≥]| or | to ", item) else item
         if "minItems" in node and node["minItems"] == node.get("maxItems"):
             return f"{node['minItems']} × {item}"
         words = f"list of {item}"
@@ -144,7 +144,7 @@ def _value(node: Tree) -> str:
     limits = [text.format(plainest(node[n], unit)) for n, text in _LIMITS.items() if n in node]
     if {"minimum", "maximum"} <= node.keys():
         limits = [f"{plainest(node['minimum'], unit)} to {plainest(node['maximum'], unit)}"]
-    return ", ".join([words, *limits])
+    return ", ".join(filter(None, ["" if limits and words == "number" else words, *limits]))
 
 
 if __name__ == "__main__":

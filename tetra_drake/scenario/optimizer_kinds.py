@@ -95,7 +95,7 @@ class QualityDiversity(OptimizerSettings):
         dict[str, list[float]],
         *by_name(UNITS, lambda x: Annotated[list[x], Field(min_length=2, max_length=2)]),
     ] = Field(default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]})
-    """Two metrics with their ranges on the map. Cells at the edge also have the values outside."""
+    """Two metrics with their ranges on the map; cells at the edge also have what is outside."""
     cells: list[CellCount] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)

@@ -65,8 +65,8 @@ class Scenario(World):
     """Limits of metrics; a gait beyond one counts as failed. A file replaces all limits of its
     base."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers besides the robot's, by scenario key: `ground.stiffness: 20 % uniform`;
-    also in the text of a number: `20 kN/m ± 20 %`."""
+    """Tolerances of numbers besides the robot's, by scenario key: `ground.stiffness: 20 %
+    uniform`."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()

@@ -28,7 +28,7 @@ class SimulationSection(Section):
     """Time between actions of a controller."""
     max_speed: Speed | None = Field(default=None, gt=0)
     """Speed of a body above which a simulation has diverged. By default more than fall, cables and
-    actuators can give; at least 10.16 m/s."""
+    actuators give; at least 10.16 m/s."""
 
     @property
     def settling_time(self) -> float:
