@@ -2,7 +2,7 @@
 
 import pytest
 
-from tetra_drake.laws.cable import CableLaw, cable_tension, slack_tension
+from tetra_drake.laws.cable import CableLaw, cable_tension, elastic_stiffness, slack_tension
 
 
 def test_tension_is_equation_6():
@@ -25,3 +25,8 @@ def test_a_cable_that_goes_slack_pulls_only_while_it_is_stretched(stretch, rate,
     found, per_rate = slack_tension(35.0 * stretch, rate, law)
     assert found == pytest.approx(tension, rel=1e-12)
     assert per_rate == (8.0 if tension == 11.0 else 0.0)
+
+
+@pytest.mark.parametrize("stretch", [-0.1, 0.0, 0.1])
+def test_the_stiffness_is_the_same_at_any_stretch(stretch):
+    assert elastic_stiffness(stretch, CableLaw(35.0, 8.0, 0.1)) == 35.0
