@@ -11,6 +11,7 @@ interrupted script continues. Then the script writes the page README.md from the
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import functools
 import hashlib
 import importlib.util
@@ -202,13 +203,16 @@ class Entry:
     solve: Callable[[Problem, int], Solution]
     tasks: Sequence[str]
     """Names of the tasks that it can solve."""
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    """Changes of the tasks' scenarios, such as another kind of oscillators."""
     digest: str = ""
     """Digest of the file, in the records of an entry that is not shipped."""
 
     @classmethod
     def of(cls, file: Path) -> Entry:
-        """The entry in a Python file: its function `solve`, its docstring, and a list TASKS if it
-        solves some tasks only. Raises InputError if it cannot be imported or has no `solve`."""
+        """The entry in a Python file: its function `solve`, its docstring, a list TASKS if it
+        solves some tasks only, and CHANGES of their scenarios if it needs any. Raises InputError if
+        it cannot be imported or has no `solve`."""
         spec = importlib.util.spec_from_file_location(f"entry_{file.stem}", file)
         if not file.is_file() or spec is None or spec.loader is None:
             raise InputError(file, "", "is no Python file")
@@ -229,11 +233,12 @@ class Entry:
             problem = f"found {sorted(unknown)[0]!r}, expected some of {', '.join(names)}"
             raise InputError(file, "TASKS", problem)
         about = (module.__doc__ or file.stem).strip().split("\n")[0].rstrip(".")
+        changes = getattr(module, "CHANGES", {})
         digest = hashlib.sha256(file.read_bytes()).hexdigest()[:12]
         is_shipped = file.resolve().parent == ENTRIES.resolve()
         if not is_shipped and (ENTRIES / file.name).exists():
             raise InputError(file, "", "has the name of a shipped entry, expected another")
-        return cls(file.stem, about, solve, tasks, "" if is_shipped else digest)
+        return cls(file.stem, about, solve, tasks, changes, "" if is_shipped else digest)
 
 
 def solved(
@@ -242,6 +247,7 @@ def solved(
     """Records of an entry's solutions to a task, one for each seed. The seeds are solved side by
     side. Raises InputError if the entry raises an error or returns something else."""
     started = time.perf_counter()
+    task = dataclasses.replace(task, changes={**task.changes, **entry.changes})
     with ThreadPoolExecutor(len(seeds)) as threads, SimulationQueue(available_cores()) as queue:
         problems = [Problem(task, queue, episodes=episodes) for _ in seeds]
         try:

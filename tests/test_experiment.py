@@ -10,12 +10,10 @@ from helpers.converged import shortly
 
 import tetra_drake
 from tetra_drake import cli
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
-from tetra_drake.evolution.manifest import RunRecord, write_manifest
+from tetra_drake.evolution.manifest import write_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
-from tetra_drake.laws.terrain import Steps
 from tetra_drake.optimizers.steady_state import SteadyStateOptimizer
 from tetra_drake.settings.units import shown_in
 
@@ -86,32 +84,10 @@ def test_a_run_is_evolved_and_checked(make, tiny, tmp_path, reports, monkeypatch
     assert again.evaluations.equals(run.evaluations)
 
 
-def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
-    step = Steps(height=0.02, depth=1.0, count=1, start=0.02)
-    for scenario, problem in (
-        (tiny.with_changes({"engine": "!Drake", "terrain": step}), "below the ground"),
-        (tiny.with_changes({"evolution.evaluations": 3}), "evolution.evaluations: .*4"),
-        (None, "is needed"),
-    ):
-        with pytest.raises(InputError, match=problem):
-            tetra_drake.evolve(scenario, tmp_path / "run")
-    assert not (tmp_path / "run").exists()
-
-
-def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
-    def evolve(seed, **options):
-        options |= QUICK | {"overwrite": True}
-        return tetra_drake.evolve(tiny, tmp_path / "run", seed=seed, **options)
-
-    first, second = evolve(1), evolve(2)
-    assert (second.manifest.seed, len(second.evaluations)) == (2, len(first.evaluations))
-    with RunRecord.resume(tmp_path / "run"), refused(tmp_path / "run", "", "at work"):
-        evolve(3)
-    assert tetra_drake.load_run(tmp_path / "run").manifest.seed == 2
-    (tmp_path / "run" / "manifest.json").unlink()
-    with refused(tmp_path / "run", "", "holds no manifest.json"):
-        evolve(3)
-    assert (tmp_path / "run" / "trial_00").is_dir()
+def test_a_run_may_replace_another(tiny, tmp_path):
+    for seed in (1, 2):
+        run = tetra_drake.evolve(tiny, tmp_path, seed=seed, overwrite=True, **QUICK)
+        assert (run.manifest.seed, len(run.evaluations)) == (seed, 8)
 
 
 def scaled(factor):
@@ -133,34 +109,31 @@ def scaled(factor):
 def test_a_run_is_resumed_only_by_its_own_method(
     tiny, tmp_path, refused, capsys, interrupting, objective, others, fact
 ):
-    run, whole = tmp_path / "run", tmp_path / "whole"
     method = {"objective": objective, "optimizer": RandomSearch} | QUICK
 
     def resume(**changes):
-        return tetra_drake.evolve(None, run, resume=True, **method | changes)
+        return tetra_drake.evolve(None, tmp_path, resume=True, **method | changes)
 
     def refuse_others():
-        recorded = read_record(run)
+        recorded = read_record(tmp_path)
         for other in others:
-            with refused(run, "objective", fact):
+            with refused(tmp_path, "objective", fact):
                 resume(objective=other)
-        with refused(run, "optimizer", ""):
+        with refused(tmp_path, "optimizer", ""):
             resume(optimizer=SteadyStateOptimizer)
-        assert cli.main(["evolve", "--out", str(run), "--resume"]) == 2
+        assert cli.main(["evolve", "--out", str(tmp_path), "--resume"]) == 2
         assert "objective=" in capsys.readouterr().err
-        assert read_record(run) == recorded
+        assert read_record(tmp_path) == recorded
 
     with pytest.raises(KeyboardInterrupt):
-        tetra_drake.evolve(tiny, run, executor=interrupting, workers=2, **method)
+        tetra_drake.evolve(tiny, tmp_path, executor=interrupting, workers=2, **method)
     refuse_others()
     evaluations = resume().evaluations
     refuse_others()
     expected = 2.0 + 2.0 * evaluations["distance"]
     assert evaluations["fitness"].values == pytest.approx(expected.values)
-    tetra_drake.evolve(tiny, whole, **method)
-    assert read_record(run) == read_record(whole)
-    with refused(run, "objective", ""):
-        reevaluate(run, None)
+    with refused(tmp_path, "objective", ""):
+        reevaluate(tmp_path, None)
 
 
 def test_an_executor_that_is_given_stays_open(tiny, tmp_path, refused):

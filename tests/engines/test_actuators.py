@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray
 from helpers.actuations import LIMITED
-from helpers.anchored import BAR, scenario_of
+from helpers.anchored import TREES, scenario_of
 from helpers.converged import shortly
 from helpers.quantities import with_unit
 from helpers.states import body_velocities
@@ -52,17 +52,10 @@ class Wound(Robot):
 
 def swaying(actuation: Actuation, *, damping: float) -> Scenario:
     """A bar between the ends of a frame, for 80 ms."""
-    law = {"stiffness": STIFFNESS, "damping": damping, "free_length": FREE_LENGTH}
-    bars, between = {"frame": "ad", "bar": "bc"}, {"passive": "ab", "driven": "cd"}
-    along = {"a": 0.0, "b": LENGTH, "c": 2.0 * LENGTH, "d": 3.0 * LENGTH}
-    tree = {
-        "nodes": {name: [x, 0.0, 0.5] for name, x in along.items()},
-        "struts": {name: BAR | {"pairs": [[*ends]]} for name, ends in bars.items()},
-        "cables": {name: law | {"pairs": [[*ends]]} for name, ends in between.items()},
-        "actuated": {"one": ["driven c d"]},
-        "gravity": 0.0,
-    }
+    groups = TREES["swaying"]["cables"].items()
+    cables = {name: group | {"damping": damping} for name, group in groups}
     still = {"cpg.gain": 0.0, "simulation.sample_period": "1 ms"}
+    tree = TREES["swaying"] | {"cables": cables}
     return scenario_of(tree, duration=0.08, actuation=actuation, **still)
 
 

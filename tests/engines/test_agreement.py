@@ -7,13 +7,15 @@ apart: a variable of the trajectory at all times, or a metric.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 import pytest
 from helpers.actuations import LIMITED, MOTOR, WINCH
-from helpers.anchored import HUNG, floating_prism, scenario_of, supported_prism
+from helpers.anchored import HUNG, floating_prism, scenario_of, slung_prism, supported_prism
+from helpers.controllers import follow_waves
 from helpers.converged import shortly
 from helpers.gaits import with_values
 from helpers.joined import with_arm
@@ -24,7 +26,7 @@ from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.command import Command
+from tetra_drake.robot.command import Command, controlled_robot
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.parameter_space import WALKING_SEED, seeded_gait
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
@@ -71,6 +73,11 @@ def gait(seed: int = WALKING_SEED, **changes: Any) -> Callable[[Scenario], Chang
 def steered(scenario: Scenario) -> Changes:
     """A gait that turns from 0.05 s on, ever more."""
     return gait()(scenario) | {"steering": lambda time: max(0.0, 5.0 * (time - 0.05))}
+
+
+def pulled_in_waves(scenario: Scenario) -> Changes:
+    """A controller that knows the lengths of the cables."""
+    return {"controller": functools.partial(follow_waves, controlled_robot(scenario))}
 
 
 def waves(mean: float, amplitude: float) -> Callable[[Scenario], Changes]:
@@ -167,6 +174,10 @@ def rows() -> Iterable[Any]:
         ("floating", floating_prism(), (CONVERGE[0], Mujoco()), 1e-4),
         ("joint and ring", with_arm(), CONVERGE, 1e-6),
         ("joint and ring", with_arm(), (CONVERGE[0], Mujoco()), 1e-4),
+        ("over fixed rings", slung_prism("west n3 east"), CONVERGE, 1e-6),
+        ("over fixed rings", slung_prism("west n3 east"), (CONVERGE[0], Mujoco()), 1e-4),
+        ("from node to node", slung_prism("n0 west n3 east n4"), CONVERGE, 1e-6),
+        ("from node to node", slung_prism("n0 west n3 east n4"), (CONVERGE[0], Mujoco()), 1e-4),
     ):
         yield row(name, scenario, 0.15, NO_BRISTLES, engines, {"p_WN": apart}, gait(3), 1e-3)
     for scenario, force in (("motors", 0.04), ("winch", 0.5)):
@@ -197,6 +208,15 @@ def rows() -> Iterable[Any]:
         engines, name = (FINE[0], Limit(5e-5)), f"prism, {kind}, MuJoCo"
         within = {"distance_in": 2e-3, "metrics.actuator_limited": 2e-4}
         yield row(name, "prism", 1.5, changes, engines, within, gait(2), slow=True)
+    # Samples are in the middle of control periods.
+    changes = {"robot.tetrahedra": 3, "simulation.sample_period": "0.122 s"} | NO_BRISTLES
+    for other in (Drake(), Mujoco()):
+        engines, within = (Compiled(), other), {"p_WN": 3e-4, "signal": 0.01}
+        cells = "coulomb", 0.61, changes, engines, within, pulled_in_waves, 5e-3
+        yield row(f"controller, {other.tag}", *cells)
+    changes = {"policy": "!Network {hidden: 3, readings: [clock, lengths, w_WB]}"}
+    changes |= {"events": [{"at": "0.153 s", "cut": ["side n2 n5"]}], "cpg.gain": "2.7 N"}
+    yield row("policy", "prism", 0.21, changes, CONVERGE, {"p_WN": 2e-5}, gait(3), 1e-3)
     # A fifth of a second after events, two of them at once.
     events = [{"at": "0.1 s", "cut": ["T1-T2 outer bottom_left"], "lose": ["T2"]}]
     events += [{"at": "0.1 s", "change": {"friction.static": 0.2, "friction.kinetic": 0.1}}]

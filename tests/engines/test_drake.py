@@ -30,19 +30,6 @@ def gait(scenario: Scenario, data: Path) -> Gait:
     return load_gait(data / "gait_e.json", scenario)
 
 
-def test_a_live_network_walks_as_the_listing_with_short_steps_does(scenario, gait):
-    # Euler's error in steps of 0.01 ms is some 1e-5.
-    changes = {"cpg.start_up": "0 s", "cpg.listing_step": "0.01 ms"}
-    changes |= {"simulation.duration": "0.2 s", "simulation.steady_from": "0.1 s"}
-    changes["engine"] = Drake(scheme="runge_kutta3", accuracy=1e-5, max_step=2e-4)
-    live, beforehand = (
-        simulate(scenario=scenario.with_changes({**changes, "cpg.signals": signals}), gait=gait)
-        for signals in ("live", "listing")
-    )
-    assert abs(beforehand.metrics.distance_in) > 0.02
-    assert live.metrics.distance_in == pytest.approx(beforehand.metrics.distance_in, abs=2e-3)
-
-
 def test_the_work_counts_all_steps_from_the_start(scenario, gait):
     # New Jacobians after mode changes clear the integrator's own counts.
     times = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.5 s"}
@@ -80,7 +67,13 @@ def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scena
 
 @pytest.mark.parametrize(
     ("tetrahedra", "damping", "scheme"),
-    [(5, 0.05, "radau3"), (24, 0.05, "radau3"), (48, 0.05, "runge_kutta3"), (48, 0.5, "radau3")],
+    [
+        (5, 0.05, "radau3"),
+        (24, 0.05, "radau3"),
+        (48, 0.05, "runge_kutta3"),
+        (48, 0.5, "radau3"),
+        (13, 0.0, "runge_kutta3"),
+    ],
 )
 def test_large_robots_are_integrated_explicitly_unless_dampers_are_fast(
     scenario, tetrahedra, damping, scheme

@@ -14,7 +14,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.laws.terrain import Rough, Steps
+from tetra_drake.laws.terrain import Rough
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.measures import path_of_centre
 from tetra_drake.robot.parameter_space import seeded_gait
@@ -67,18 +67,6 @@ def test_recording_and_watching_change_nothing(walk, engine):
     assert wound.any() == (walk == "winch")
 
 
-WRONG_DRIVES = [([], "gait"), (["gait", "command"], "command")]
-WRONG_DRIVES += [(["command", "steering"], "command"), (["gait", "controller"], "controller")]
-
-
-@pytest.mark.parametrize(("what", "key"), WRONG_DRIVES)
-def test_a_robot_follows_a_gait_or_a_command(scenario, what, key, refused):
-    chosen = {"gait": seeded_gait(scenario), "command": WAVES, "steering": 0.5}
-    chosen["controller"] = lambda time, readings: np.zeros(8)
-    with refused("simulate", key, ""):
-        simulate(scenario, **{name: chosen[name] for name in what})
-
-
 def test_the_path_is_that_of_the_trajectory(scenario, engine):
     beside = [[0.0, f"{y} mm", 0.0] for y in (4, 0, -3)]
     changes = {"robot.tetrahedra": 3, "robot.offsets": beside, "engine": engine}
@@ -108,20 +96,6 @@ def test_a_simulation_that_fails_on_the_diagram_says_when_and_why(scenario, chan
     assert caught.value.reason in str(caught.value)
     sent = pickle.loads(pickle.dumps(caught.value))  # to another process
     assert (type(sent), sent.time, str(sent)) == (kind, caught.value.time, str(caught.value))
-
-
-BEYOND_MUJOCO = [("cpg.feedback", ["load"]), ("friction.static", 0.6)]
-BEYOND_MUJOCO += [("friction.stiffness", "1 kN/m"), ("friction.lateral", 2.0)]
-BEYOND_MUJOCO += [("terrain", Steps(height=INCH, depth=6.0 * INCH, count=2))]
-
-
-@pytest.mark.parametrize(("key", "value"), BEYOND_MUJOCO)
-def test_what_mujoco_cannot_simulate_is_refused(scenario, key, value, monkeypatch, refused):
-    monkeypatch.setattr("tetra_drake.engines.mujoco.installed", lambda: True)
-    level = scenario.with_changes({"engine": "!Mujoco", "friction": Coulomb()})
-    changed = level.with_changes({"cpg.signals": "live", key: value})
-    with refused("thesis", key):
-        simulate(changed, seeded_gait(changed))
 
 
 def test_without_mujoco_its_engine_is_refused(scenario, monkeypatch, refused):

@@ -10,7 +10,7 @@ from helpers.converged import shortly
 from helpers.states import energy_and_momenta
 
 from tetra_drake.engines.lanes.batch import LaneBatch
-from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.kinematics import P_WN, V_WN
 from tetra_drake.robot.command import Command, controlled_robot
 from tetra_drake.robot.parameter_space import seeded_gait
@@ -121,18 +121,6 @@ def test_the_actuator_of_a_cut_cable_turns_freely(kind):
     assert (after.tension == 0.0).all() and (cable.tension[:5] > 0.0).all()
     start = float(cable.free_length[0])
     assert float(after.free_length[-1]) == pytest.approx(start, abs=1e-6)
-
-
-def test_a_robot_with_an_event_disturbs_no_other_in_its_batch():
-    scenario = shortly(load_scenario("thesis"), 0.4, engine="!Compiled")
-    lost = scenario.with_changes({"robot.payload": ["9 g"] * 5})
-    events = [{"at": "0.2 s", "cut": [CUT]}, {"at": "0.2 s", "lose": ["T2", "T5"]}]
-    scenarios = [scenario, lost.with_changes({"events": events}), lost]
-    gait = seeded_gait(scenario, 2)
-    together = simulate_many(scenarios, [gait] * 3, workers=1)
-    alone = [simulate(each, gait).metrics for each in scenarios]
-    assert [result.metrics for result in together] == alone
-    assert len({metrics.distance for metrics in alone}) == 3
 
 
 def test_drawn_missing_cables_repeat_with_their_seed():

@@ -56,17 +56,6 @@ def test_mujoco_has_the_robot_at_rest_in_its_key_frame(study):
     assert np.abs(data.qacc.reshape(-1, 6)[:, :3]).max() < 0.01 * robot.scenario.robot.gravity
 
 
-def test_motors_have_the_names_of_the_groups(study):
-    mujoco = pytest.importorskip("mujoco")
-    model, structure = mujoco.MjModel.from_xml_string(make_mjcf(study.robot)), study.robot.structure
-    names = [model.actuator(i).name for i in range(model.nu)]
-    assert len(names) == len(set(names)) == sum(map(len, structure.groups))
-    for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
-        its = [name for name in names if name == oscillator or name.startswith(f"{oscillator} ")]
-        tendons = {model.tendon(model.actuator(name).trnid[0]).name for name in its}
-        assert tendons == {structure.cable_names[cable] for cable in group}
-
-
 def test_drake_has_the_bodies_of_the_sdf_and_its_cables_the_tensions_at_rest(study):
     structure, state = study.robot.structure, study.robot.equilibrium.state
     builder = DiagramBuilder()

@@ -146,10 +146,3 @@ def test_cables_that_go_slack_walk_as_tendons_while_they_are_taut(short):
     ours, tendons = (simulate(scenario, gait).metrics for scenario in (taut, short))
     assert ours.distance == pytest.approx(tendons.distance, abs=1e-5)
     assert "slack" in loose_remark(Robot.of(taut)) and not loose_remark(Robot.of(short))
-
-
-def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
-    tiny = {"robot.strut_length": "5 mm", "robot.spacing": "2.5 mm"}
-    light = short.with_changes(tiny | {"robot.density": "1e-4 kg/m^3"})
-    with refused("thesis", "robot", "'T1'", "1e-14"):
-        simulate(scenario=light, gait=seeded_gait(light))

@@ -83,37 +83,24 @@ def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
     assert np.abs(one.p_WB.sel(axis="y")).max() > 1e-4, "it goes to a side"
 
 
-@BOTH
-def test_zero_gains_give_the_walk_without_feedback(scenario, engine):
-    blind = shortly(scenario, 0.3, robot__tetrahedra=2, cpg__signals="live")
-    senses = blind.with_changes({"cpg.feedback": list(PATHWAYS)})
-    gait = seeded_gait(blind)
-    one, other = walk(blind, gait, engine), walk(senses, gait, engine)
-    np.testing.assert_array_equal(other.signal.values, one.signal.values)
-    np.testing.assert_array_equal(other.p_WN.values, one.p_WN.values)
+def test_each_feedback_changes_the_signals_and_gains_of_zero_do_not(scenario):
+    live = {"cpg__signals": "live", "friction": Coulomb()}
+    blind = shortly(scenario, 0.3, **live)
+    senses, gait = blind.with_changes({"cpg.feedback": list(PATHWAYS)}), seeded_gait(blind)
+    without = walk(blind, gait, "!Compiled").signal.values
+    gait = with_values(gait, **{f"gain {pathway}": 0.0 for pathway in PATHWAYS})
+    np.testing.assert_array_equal(walk(senses, gait, "!Compiled").signal, without)
+    for pathway in PATHWAYS:
+        felt = walk(senses, with_values(gait, **{f"gain {pathway}": 1.0}), "!Compiled").signal
+        assert np.abs(felt - without).max() > 1e-3, "more than engines may differ by"
 
 
-def test_each_feedback_changes_the_signals(scenario):
-    live = {"cpg__signals": "live", "cpg__feedback": list(PATHWAYS), "friction": Coulomb()}
-    short = shortly(scenario, 0.3, **live)
-    blind = with_values(seeded_gait(short), **{f"gain {pathway}": 0.0 for pathway in PATHWAYS})
-    gaits = [blind, *(with_values(blind, **{f"gain {pathway}": 1.0}) for pathway in PATHWAYS)]
-    none, *felt = (walk(short, gait, "!Compiled").signal for gait in gaits)
-    for signal in felt:
-        assert np.abs(none - signal).max() > 1e-3, "more than engines may differ by"
-
-
-def test_a_constant_number_steers_as_the_gaits_turn_does(refused):
+def test_a_constant_number_steers_as_the_gaits_turn_does():
     short = shortly(load_scenario("turning"), 0.4, engine="!Compiled")
     gait = dataclasses.replace(seeded_gait(short), turn=0.0)
     turned = simulate(scenario=short, gait=dataclasses.replace(gait, turn=0.5))
     for turn in (0.5, np.float64(0.5)):
         assert simulate(scenario=short, gait=gait, steering=turn).metrics == turned.metrics
-    for wrong in ("left", True, [0.5]):
-        with refused("steering", "", repr(wrong)):
-            simulate(scenario=short, gait=gait, steering=wrong)
-    with refused("steering", "at 0 s", "1.5"):
-        simulate(scenario=short, gait=gait, steering=1.5)
 
 
 def test_one_gait_walks_straight_on_and_turns_either_way(data):

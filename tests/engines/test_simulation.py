@@ -1,10 +1,8 @@
 """Robots in control periods, Simulation(count=N), and controllers that do the same."""
 
-import copy
 import functools
 import math
 import multiprocessing
-import pickle
 import signal
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +12,7 @@ import pytest
 from helpers.actuations import FORCE, MOTOR, WINCH
 
 from tetra_drake.engines.lanes.batch import LaneThread, processor_lanes
-from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import Diverged, InputError
 from tetra_drake.robot.command import Command
@@ -114,16 +112,6 @@ def test_a_controller_that_gives_the_samples_of_a_command_gives_its_motion(
         assert found.trajectory.equals(trajectory), "bit for bit"
 
 
-def test_robots_of_another_engine_are_simulated_and_not_stepped(short, engine, refused):
-    scenario = short.with_changes({"engine": engine})
-    if engine == "!Compiled":
-        assert Simulation(scenario).step(np.zeros(8)).time == [PERIOD]
-        return
-    with refused("scenario thesis", "engine", engine[1:].lower(), "on_engine('compiled')"):
-        Simulation(scenario)
-    assert not Simulation(scenario.on_engine("compiled")).ended[0]
-
-
 def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
     alone, simulation = (Simulation(short, count=LANES, workers=1) for _ in range(2))
     actions = drawn_actions(alone)
@@ -212,49 +200,3 @@ def test_robots_in_two_threads_go_on_in_a_fork(short):
     child.start()
     child.join(60.0)
     assert child.exitcode == 0
-
-
-WRONG = {"control_period": (0.00075, "fast", 1e29), "count": (0, 1.5, True, 10**9)}
-WRONG |= {"record": ("nan",), "name": (None,), "workers": ("x",)}
-NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("call", "key", "facts"),
-    [
-        (lambda two: two.step(np.zeros((2, 7))), "actions", ("(2, 7)", "(2, 8)")),
-        *(
-            (lambda two, a=actions: two.step(a), "actions", ("real numbers of shape (2, 8)",))
-            for actions in ("fast", np.zeros((2, 8), object), np.ma.masked_all((2, 8)))
-        ),
-        (lambda two: two.step(NAN), "actions[1, 4]", ("nan",)),
-        (lambda two: two.result(1), "result", ("robot 1 is at 0 s",)),
-        *(
-            (lambda two, i=indices: two.reset(indices=i), "indices", ("0 to 1",))
-            for indices in ([2], [0.5], 1, [[]])
-        ),
-        *(
-            (lambda two, a={key: value}: Simulation(two.scenario, **a), key, (repr(value),))
-            for key, values in WRONG.items()
-            for value in values
-        ),
-        (lambda two: two.reset(seed=-1), "seed", ("-1",)),
-        (lambda two: two.reset(seed=[1, 2, 3]), "seed", ("3 seeds",)),
-        (copy.deepcopy, "", ("the same arguments",)),
-        (pickle.dumps, "", ("the same arguments",)),
-    ],
-)
-def test_wrong_input_is_told_in_a_line(short, call, key, facts, refused):
-    two = Simulation(short.with_sections(disturbances=Disturbances(draws=1)), count=2, workers=1)
-    with refused("Simulation", key, *facts):
-        call(two)
-    with refused("simulate_many", "workers", "2.5"):
-        simulate_many(short, [], workers=2.5)
-
-
-def test_a_robot_that_has_ended_is_not_moved_on(short, refused):
-    two = Simulation(short, count=2, workers=1)
-    go(two, np.zeros((PERIODS, 2, 8)))
-    two.reset(indices=[0])
-    with refused("Simulation", "step", "robot 1", "0.3 s"):
-        two.step(np.zeros((2, 8)))

@@ -6,14 +6,11 @@ a difference of 9e-8 m.
 """
 
 import dataclasses
-import functools
 import json
 
 import numpy as np
 import pytest
-from helpers.actuations import SIDES
-from helpers.anchored import BAR, floating_prism
-from helpers.converged import shortly
+from helpers.anchored import BAR, TREES, floating_prism, scenario_of
 from helpers.kernels import Stepper
 from helpers.structures import (
     driven_as_recorded,
@@ -24,8 +21,7 @@ from helpers.structures import (
 )
 
 from tetra_drake.engines.mujoco import installed
-from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
-from tetra_drake.experiment import evolve
+from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.cable import LENGTH, PASSIVE
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
@@ -40,7 +36,6 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.structure_files import read_structure
 
 AMPLITUDE, FREQUENCY, INTERVAL = 1.5, 2.0 * np.pi, 0.5  # N, rad/s, s between recorded centres
 
@@ -121,19 +116,6 @@ def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_na
         np.testing.assert_allclose(poses[..., 4:], expected[..., 4:], rtol=0, atol=allowed)
 
 
-def test_opposite_turns_of_a_mirrored_gait_lead_to_mirror_images():
-    changes = BRIEF | {"engine": "!Compiled", "cpg.signals": "live", "gait_bounds.mirrored": True}
-    changes |= {"robot.tetrahedra": 2} | SIDES
-    row = Robot.of(load_scenario("coulomb").with_changes(changes))
-    scenario = row.scenario.with_changes(
-        {"robot": row_as_kind(row), "objective": {"speed": "1 s/m"}}
-    )
-    gait = seeded_gait(scenario, 3)
-    left, right = (simulate(scenario, gait, steering=turn).path.centre for turn in (0.6, -0.6))
-    np.testing.assert_allclose(left * [1.0, -1.0, 1.0], right, atol=1e-5)
-    assert np.ptp(left[:, 1]) > 5e-4, "it turns"
-
-
 def felt(robot: Robot, *, longer: float = 1.0, pushes: float = 0.0, **gains: float):
     """(oscillators, 2): the feedback to extensor and flexor of a robot in its pose of rest, whose
     cables are longer by a factor, and whose contacts near the ground bear some force in N each."""
@@ -208,20 +190,9 @@ def test_a_robot_that_nothing_drives_falls_and_rests(undriven, signals):
         np.testing.assert_allclose(fallen.p_WN[-1, :, 2], heights, atol=1e-5)
 
 
-TIE = {"pairs": [["hook", "load"]], "damping": 0.0, "free_length": 0.98}
-LOAD_ON_TWO_ROPES = {
-    "nodes": {"hook": [0.0, 0.0, 2.0], "load": [0.0, 0.0, 1.0]},
-    "cables": {"rope": TIE | {"stiffness": 600.0}, "spring": TIE | {"stiffness": 400.0}},
-    "masses": {"load": 1.0},
-    "anchors": {"hook": "xyz"},
-    "offsets": [[0.0, 0.0, 0.005]],
-}
-
-
 def test_parallel_cables_add_and_a_load_needs_no_strut(engine):
     changes = {"engine": engine, "friction.stiffness": "0 N/m"}
-    scenario = load_scenario("prism").with_changes(BRIEF | changes)
-    scenario = scenario.with_sections(robot=StructureFile.model_validate(LOAD_ON_TWO_ROPES))
+    scenario = scenario_of(TREES["two_ropes"]).with_changes(BRIEF | changes)
     g, robot = scenario.robot.gravity, Robot.of(scenario)
     assert robot.equilibrium.lengths == pytest.approx([0.98 + g / 1000.0] * 2)
     trajectory = simulate(scenario, seeded_gait(scenario), record=True).trajectory
@@ -230,31 +201,6 @@ def test_parallel_cables_add_and_a_load_needs_no_strut(engine):
     np.testing.assert_allclose(trajectory.p_WB[:, 0, 2], heights, atol=5e-5)
     tension = g - 1000.0 * rise[:, np.newaxis] * [1.0, 1.0]
     np.testing.assert_allclose(trajectory.tension / [0.6, 0.4], tension, atol=0.05)
-
-
-@pytest.mark.parametrize("path", [["west", "n3", "east"], ["n0", "west", "n3", "east", "n4"]])
-def test_a_cable_over_fixed_rings_pulls_alike_on_all_engines(engine, path):
-    tree = read_structure("prism").model_dump()
-    sling = {"pairs": [path], "stiffness": 60.0, "damping": 1.0, "free_length": 0.8}
-    fixed = {"west": [-0.3, 0.0, 0.6], "east": [0.3, 0.0, 0.6]}
-    tree["nodes"] |= fixed
-    tree |= {"cables": tree["cables"] | {"sling": sling}, "anchors": dict.fromkeys(fixed, "xyz")}
-    hung = load_scenario("prism").with_sections(robot=StructureFile.model_validate(tree))
-
-    def ends(engine: str) -> np.ndarray:
-        changes = {"terrain": "!Nothing {}", "friction.stiffness": "0 N/m", "engine": engine}
-        scenario = shortly(hung, 0.2, **changes)
-        return simulate(scenario, seeded_gait(scenario), record=True).trajectory.p_WN.values[-1]
-
-    moved = ends("!Drake {scheme: runge_kutta3, accuracy: 1e-7}")
-    np.testing.assert_allclose(ends(engine), moved, atol=1e-4)
-
-
-def test_a_robot_that_nothing_drives_has_no_gaits_to_search(undriven, refused, tmp_path):
-    for search in (check_scenario, functools.partial(evolve, out=tmp_path / "run")):
-        with refused(undriven.name, "robot.actuated", "oscillator"):
-            search(undriven)
-    assert not (tmp_path / "run").exists()
 
 
 def test_what_a_structure_lacks_is_null_in_its_result(tmp_path):

@@ -1,6 +1,7 @@
 """A recorded run as tables: columns, best gaits, populations, states of trials."""
 
 import dataclasses
+import functools
 import lzma
 import math
 
@@ -87,17 +88,13 @@ def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused,
     assert list(file.read()) == [*entries, more]
     packed = run / "trial_00" / "iterations.jsonl.xz"
     monkeypatch.setattr("tetra_drake.evolution.entries.MOST", 2**20)
-    torn, large = lzma.compress(b"{}\n")[:-9], lzma.compress(bytes(2**21), preset=0)
-    for content in (b"", b"no xz", torn, large):
+    compress = functools.partial(lzma.compress, preset=0)
+    faults = {b"": "", b"no xz": "", compress(b"{}\n")[:-9]: ""}
+    faults |= {compress(bytes(2**21)): "", compress(b"{}"): "no end"}
+    no_json = (b"{nonsense\n", b"[1]\n", b"\xff\n", b"[" * 10**5 + b"\n")
+    for content, fact in (faults | {compress(line): "JSON" for line in no_json}).items():
         packed.write_bytes(content)
-        with refused(packed, "", ""):
-            load_run(run)
-    packed.write_bytes(lzma.compress(b"{}", preset=0))
-    with refused(packed, "line 1", "no end"):
-        load_run(run)
-    for line in (b"{nonsense\n", b"[1]\n", b"\xff\n", b"[" * 10**5 + b"\n"):
-        packed.write_bytes(lzma.compress(line, preset=0))
-        with refused(packed, "line 1", "JSON"):
+        with refused(packed, "line 1" if fact else "", fact):
             load_run(run)
 
 

@@ -16,8 +16,8 @@ from tetra_drake.evolution.trials import RepeatedFile
 from tetra_drake.optimizers.base import Evaluation, Task
 
 
-def create(directory):
-    record = RunRecord.create(directory, scenario=small_scenario(), seed=5)
+def create(directory, **options):
+    record = RunRecord.create(directory, scenario=small_scenario(), seed=5, **options)
     record.begin()
     return record
 
@@ -167,3 +167,8 @@ def test_a_run_is_replaced_when_a_new_one_has_its_first_line(run_small, monkeypa
     files = {".lock", "manifest.json", "scenario.yaml", "trial_00/in_progress.jsonl"}
     assert read_record(run).keys() == files
     assert read_manifest(run).seed == 6
+    with RunRecord.resume(run), refused(run, "", "at work"):
+        create(run, overwrite=True)
+    (run / "manifest.json").unlink()
+    with refused(run, "", "holds no manifest.json"):
+        create(run, overwrite=True)

@@ -51,3 +51,11 @@ def supported_prism(**changes: object) -> Scenario:
 def floating_prism(**changes: object) -> Scenario:
     """The shipped prism without weight."""
     return scenario_of(read_once("prism").model_dump() | {"gravity": 0.0}, **changes)
+
+
+def slung_prism(path: str) -> Scenario:
+    """The shipped prism with a cable over fixed rings, from node to node of a path."""
+    prism, fixed = read_once("prism").model_dump(), TREES["slung"]["nodes"]
+    sling = TREES["slung"]["cables"]["sling"] | {"pairs": [path.split()]}
+    parts = {"nodes": prism["nodes"] | fixed, "cables": prism["cables"] | {"sling": sling}}
+    return scenario_of(prism | parts | {"anchors": dict.fromkeys(fixed, "xyz")})

@@ -23,24 +23,10 @@ from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
-@dataclasses.dataclass(frozen=True)
-class Thrown(Structure):
-    """A structure whose bodies move at t = 0."""
-
-    v_WB: np.ndarray = dataclasses.field(kw_only=True)
-    """Angular velocities (rad/s) and velocities (m/s) of the bodies: (bodies, 6)."""
-
-    @property
-    def initial_state(self) -> np.ndarray:
-        state = super().initial_state
-        state[7 * len(self.bodies) :] = self.v_WB.ravel()
-        return state
-
-
 def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
-    """The robot whose bodies move at t = 0."""
-    fields = {f.name: getattr(robot.structure, f.name) for f in dataclasses.fields(Structure)}
-    return dataclasses.replace(robot, structure=Thrown(**fields, v_WB=v_WB))
+    """The robot whose bodies move at t = 0, with angular velocities (rad/s) and velocities (m/s)
+    (bodies, 6)."""
+    return dataclasses.replace(robot, structure=dataclasses.replace(robot.structure, v_WB=v_WB))
 
 
 def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:

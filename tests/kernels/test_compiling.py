@@ -88,31 +88,6 @@ def test_only_kernels_that_use_what_was_edited_are_compiled_anew(package, tmp_pa
     assert not {"compute_cable_forces", "state_signals", "factorise"} & changed
 
 
-@pytest.mark.slow
-def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(package, tmp_path):
-    # outer() contains inner(), which uses a number of a third module; they may be in any folder.
-    kernels, name = package / "tetra_drake" / "elsewhere" / "deeper", "tetra_drake.elsewhere.deeper"
-    kernels.mkdir(parents=True)
-    begin = "from tetra_drake.kernels.compiling import compiled, inlined\n"
-    inner = f"import {name}.constant as other\n@inlined\ndef inner():\n    return other.VALUE\n"
-    outer = f"from {name}.inner import inner\n@compiled\ndef outer():\n    return inner()\n"
-    (kernels / "inner.py").write_text(begin + inner)
-    (kernels / "outer.py").write_text(begin + outer)
-    (kernels / "__pycache__").write_text("in the way")
-    program = f"from {name}.outer import outer\n"
-    program += "print(outer(), sum(outer.stats.cache_hits.values()))\n"
-
-    def value_and_hits(value: float) -> list[str]:
-        (kernels / "constant.py").write_text(f"VALUE = {value}\n")
-        return run(package, tmp_path / "cache", program).split()
-
-    assert [value_and_hits(x) for x in (1.0, 1.0, 2.0)] == [
-        ["1.0", "0"],
-        ["1.0", "1"],
-        ["2.0", "0"],
-    ]
-
-
 def twice(x):
     return x + x
 

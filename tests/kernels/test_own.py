@@ -1,7 +1,5 @@
 """Laws with functions of their own: compiled for the robots that have them, and only for those."""
 
-import importlib
-import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -74,22 +72,3 @@ def test_a_function_that_numba_cannot_compile_is_one_line_with_its_place():
     with pytest.raises(InputError, match="'dampin' of type Oil") as refused:
         force_of(law_of(misspelt_force))
     assert "test_own.py (" in refused.value.source and "\n" not in str(refused.value)
-
-
-def test_a_changed_law_of_a_plugin_is_compiled_anew(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # files change within a second
-    package = tmp_path / "oily"
-    package.mkdir()
-    (package / "__init__.py").write_text("")
-    text = "from oily import other\ndef force(slide, law): return other.a, other.a  # {}\n"
-    names = []
-    for value, comment in ((1.0, "once"), (1.0, "twice"), (2.0, "twice")):
-        (package / "law.py").write_text(text.format(comment))
-        (package / "other.py").write_text(f"a = {value}\n")
-        for module in ("oily", "oily.law", "oily.other"):
-            monkeypatch.delitem(sys.modules, module, raising=False)
-        importlib.invalidate_caches()
-        force = importlib.import_module("oily.law").force
-        names.append(Packed((law_of(force, force),)).kind.name)
-    assert names[0] == names[1] != names[2]

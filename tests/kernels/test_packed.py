@@ -45,15 +45,12 @@ def parts_of(*, flag: bool = True, flips: bool = False, rows: int = 2) -> tuple[
 
 @pytest.mark.parametrize(("flag", "flips"), [(True, False), (True, True), (False, False)])
 def test_a_kernel_gets_all_that_is_packed(flag, flips):
-    parts = parts_of(flag=flag, flips=flips)
-    packed, x = Packed(parts), np.array([0.5])
+    parts, x = parts_of(flag=flag, flips=flips), np.array([0.5])
     sign, total = (-1.0 if flips else 1.0), (0.5 * (210.0 + 543.0) if flag else 0.0)
-    assert gather_sums(packed, x) == machine_code(gather_sums, packed, x)(packed, x)
-    assert gather_sums(packed, x) == sign * total + 7
+    for call in (gather_sums, machine_code(gather_sums, Packed(parts), x), gather_sums.py_func):
+        assert call(Packed(parts), x) == sign * total + 7
     assert parts[1].tolist() == [sign * 210.0, sign * 543.0]
-    for given in (packed, parts):
-        assert gather_sums.py_func(given, x) == sign * total + 7, "in Python, too"
-    assert gather_sums(parts, x) == sign * total + 7
+    assert gather_sums(parts, x) == gather_sums.py_func(parts, x) == sign * total + 7
 
 
 def test_robots_of_any_size_share_machine_code():

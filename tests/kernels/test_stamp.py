@@ -2,28 +2,17 @@
 
 import textwrap
 from collections import namedtuple
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+import yaml
 
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.stamp import stamp
 
-USES = {
-    "a global": "return x + VALUE",
-    "an attribute of a module": "return x + other.VALUE",
-    "an array": "return x + TABLE[0]",
-    "a tuple": "return x + PAIR[1]",
-    "a called function": "return called(x)",
-    "a called kernel": "return kernel(x)",
-    "a closure": "return of_closure(x)",
-    "a default": "return with_default(x)",
-    "an inner function": "return [y + VALUE for y in (x,)][0]",
-    "a constant of its own": "return x + {value}",
-    "fields of a NamedTuple": "return Point(x)",
-    "itself": "return outer(x - 1.0) if x > VALUE else x",
-}
+USES = yaml.safe_load(Path(__file__).with_name("uses.yaml").read_text("utf-8"))
 
 
 def function_of(text, value, comment="", doc="", field="a", other=0.0):

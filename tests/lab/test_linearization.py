@@ -22,10 +22,8 @@ from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
 from tetra_drake.lab.linearization.linearization import Linearization, linearize
-from tetra_drake.lab.linearization.rates import rates_and_forces
 from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.laws.contact import MODE_COLUMNS
-from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.readings import first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
@@ -98,22 +96,6 @@ def test_a_small_push_moves_the_robot_as_the_linear_system(scenario, speed):
         farthest = max(farthest, np.abs(moved[0]).max())
         assert linear.deviation(found) == pytest.approx(x, abs=0.03 * np.abs(x).max())
     assert 1e-6 < farthest < 2e-4
-
-
-def test_the_rates_are_those_of_the_diagram():
-    scenario = load_scenario("winch")
-    robot, gait = Robot.of(scenario), seeded_gait(scenario)
-    diagram, bodies = MakeTensegrityDiagram(robot, gait), len(robot.structure.bodies)
-    context, plant = diagram.CreateDefaultContext(), diagram.GetSubsystemByName("plant")
-    state = robot.structure.initial_state
-    state[7 * bodies :] = 0.01 * np.cos(np.arange(6 * bodies))
-    plant.SetPositionsAndVelocities(plant.GetMyContextFromRoot(context), state)
-    rates = diagram.EvalTimeDerivatives(context).CopyToVector()
-    given = state, robot.starting_modes, robot.first_signals, robot.starting_drives()
-    found = rates_and_forces(robot.model, *given)
-    expected = rates[7 * bodies : 13 * bodies], rates[13 * bodies :]
-    for ours, theirs in zip(found[:2], expected, strict=True):
-        assert ours == pytest.approx(theirs, rel=1e-9, abs=1e-9 * np.abs(theirs).max())
 
 
 @pytest.mark.parametrize("actuation", ["!Force", "!Winch {max_force: 200 N, max_speed: 2 m/s}"])
@@ -251,6 +233,7 @@ def test_a_regulator_damps_the_slow_swing_of_a_load_on_a_long_rope():
     tree = copy.deepcopy(TREES["load"])
     tree["nodes"]["hook"], tree["masses"]["load"] = [0, 0, long], mass
     tree["cables"]["rope"]["tension"] = mass * 9.80665
+    tree["cables"]["guy"]["tension"] = 1e-3  # hardly any, beside the weight
     linear = linearize(scenario_of(tree))
 
     gain = linear.lqr(np.eye(12), cost * np.eye(2))
@@ -314,9 +297,6 @@ def test_the_page_shows_one_mode_with_damping(tmp_path):
     assert set(film["progress"]["values"]) == {study.damped.frequencies[1]}
     poses = film["resolution"] * np.cumsum(film["poses"], axis=1).reshape(3, 7, -1)
     assert 0.005 < np.ptp(poses[:, :3], axis=2).max() < 0.05
-    with pytest.raises(InputError) as caught:
-        save_structure_page(study, tmp_path / "none.html", mode=10)
-    assert (caught.value.key, (tmp_path / "none.html").exists()) == ("mode", False)
 
 
 PRISM = "prism"

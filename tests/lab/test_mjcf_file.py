@@ -20,6 +20,7 @@ from tetra_drake.lab.bridges.conversion import converted
 from tetra_drake.lab.study.equilibrium import robot_of_file, robot_of_structure
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import shipped_structures
 from tetra_drake.scenario.structure_files import read_structure, save_structure
 
@@ -119,6 +120,19 @@ def test_what_a_file_of_others_says(tmp_path: Path) -> None:
     words = ("door", "wall", "t3", "t4", "flex", "'limited' of tendons, left out: t1", "1 0 -5")
     assert all(word in told for word in words)
     assert "t2" not in told
+
+
+def test_a_spring_that_hardens_is_the_same_in_mujoco_and_back(tmp_path: Path) -> None:
+    law = {"damping": 0.0, "stiffness": 40.0, "quadratic": 300.0, "cubic": 5e4}
+    cables = {"coil": {"pairs": [["hook", "bob"]], "free_length": 0.2, **law}}
+    nodes = {"hook": [0.0, 0.0, 1.0], "bob": [0.0, 0.0, 0.7]}
+    tree = {"nodes": nodes, "cables": cables, "anchors": {"hook": "xyz"}, "masses": {"bob": 0.3}}
+    robot = robot_of_structure(StructureFile.model_validate(tree), "hung")
+    data = mujoco.MjData(model := model_of(robot))
+    mujoco.mj_step1(model, data)
+    assert data.qfrc_passive[2] == approx(0.3 * robot.scenario.robot.gravity, rel=1e-6)
+    (tmp_path / "a.xml").write_text(make_mjcf(robot))
+    assert dict(converted(tmp_path / "a.xml").cables["coil"]).items() >= law.items()
 
 
 @pytest.mark.parametrize("parts", ROWS["rests"])

@@ -3,22 +3,19 @@
 import itertools
 
 import numpy as np
-import pandas
 import pytest
 from helpers.judgements import judgement_by_hand
 from helpers.quantities import with_unit
 from helpers.synthetic_run import tiny_scenario
 
-from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.study import robustness
 from tetra_drake.lab.study.robustness import robustness_text
 from tetra_drake.lab.study.statistics import share_interval
-from tetra_drake.robot.gait_file import save_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws, fresh_seed
 from tetra_drake.scenario.experiment_sections import Disturbances
-from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.load import load_scenario
 
 DRAWS = 3
 
@@ -159,13 +156,3 @@ def test_the_summary_of_changes_begins_with_what_hurts_most_alone(made):
     correlations = found[["correlation", "correlation_size"]]
     assert correlations.loc["p"].tolist() == pytest.approx([-0.1, 0.9])
     assert correlations.loc[robustness.START].isna().all()
-
-
-def test_the_command_simulates_the_same_draws(scenario, gaits, judgement, tmp_path):
-    gait, out, short = (tmp_path / name for name in ("walks.json", "out", "short.yaml"))
-    save_gait(gaits["b"], gait, scenario)
-    short.write_text(dump_scenario(scenario))
-    options = ["--scenario", str(short), f"--draws={DRAWS}", "--seed=5", "--out", str(out)]
-    assert main(["robustness", str(gait), *options]) == 0
-    expected = judgement.draws[judgement.draws["gait"] == "b"]["distance"]
-    np.testing.assert_allclose(pandas.read_csv(out / "draws.csv")["distance"], expected)

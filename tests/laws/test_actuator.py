@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tetra_drake.laws.actuator import ActuatorForce, Limits, motor_force, winch_force
+from tetra_drake.laws.actuator import ActuatorForce, Limits, Winch, motor_force, winch_force
 from tetra_drake.laws.cable import CableLaw
 
 CABLE = CableLaw(stiffness=100.0, damping=5.0, free_length=0.2)
@@ -103,3 +103,25 @@ def test_a_tension_motor_pulls_less_the_faster_it_winds(rate, most):
     assert pull(16.0, 0.4, rate=rate).tension == pytest.approx(most)
     assert pull(16.0, 0.4, rate=rate).limited == 1.0
     assert pull(0.5 * most, 0.3, rate=rate).tension == pytest.approx(0.5 * most)
+
+
+def test_a_motor_gives_what_its_data_sheet_says():
+    # 1.5 N m and 59 / min on a spool of 10 mm: 150 N, 2 pi 59 / 60 s * 10 mm = 61.8 mm/s.
+    winch = Winch(motor="AX-12A", spool="10 mm")
+    assert winch.max_force == pytest.approx(150.0)
+    assert winch.max_speed == pytest.approx(0.0617847, rel=1e-5)
+    assert Winch(**winch.model_dump()) == winch
+
+
+@pytest.mark.parametrize(
+    ("given", "key", "word"),
+    [
+        ({"motor": "AX-12", "spool": "1 cm"}, "motor", "AX-12A"),
+        ({"spool": "1 cm"}, "motor", "expected one of"),
+        ({"motor": "AX-12A"}, "spool", "m"),
+        ({"motor": "AX-12A", "spool": "-1 cm"}, "spool", "above 0"),
+    ],
+)
+def test_a_wrong_motor_is_refused(given, key, word, refused):
+    with refused("Winch", key, word):
+        Winch(**given)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.robot_on_ground import RobotOnGround
+from scipy.spatial.transform import Rotation
 
 from tetra_drake.laws.contact import HEADING, MODE
 from tetra_drake.laws.friction import Coulomb, ResetConstants, first_zero
@@ -144,12 +145,14 @@ def test_a_node_that_sticks_again_does_so_where_it_is(sliding):
 
 def test_the_heading_is_that_of_the_body_at_touchdown(sliding):
     np.testing.assert_allclose(sliding.modes[:-1, HEADING : HEADING + 2], [[1.0, 0.0]] * 10)
+    # By 0.6 about z, after the nose has gone down by 0.4.
+    yaw, pitch = Rotation.from_rotvec([0.0, 0.0, 0.6]), Rotation.from_rotvec([0.0, 0.4, 0.0])
+    x, y, z, w = (yaw * pitch).as_quat()
     state = sliding.structure.initial_state
-    turn = np.array([np.cos(0.3), 0.0, 0.0, np.sin(0.3)])  # by 0.6 about z
-    state[:35].reshape(5, 7)[:, :4] = turn
-    state[:35].reshape(5, 7)[:, 4:] += [0.0, 0.0, -0.2]
+    state[:35].reshape(5, 7)[:, :4] = [w, x, y, z]
+    state[:35].reshape(5, 7)[:, 4:] += [0.0, 0.0, -0.3]
     sliding.modes[:] = 0.0
     sliding.update_at(state)
-    forward = np.array([np.cos(0.6), np.sin(0.6), 0.0]) @ sliding.R
+    forward = (yaw * pitch).apply([1.0, 0.0, 0.0]) @ sliding.R
     expected = forward[:2] / np.linalg.norm(forward[:2])
     np.testing.assert_allclose(sliding.modes[:, HEADING : HEADING + 2], [expected] * 11, atol=1e-9)

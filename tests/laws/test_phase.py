@@ -117,31 +117,3 @@ def test_with_common_lags_a_gait_is_a_travelling_sine_of_two_numbers(scenario, s
     phases = math.tau * f * (times[:, np.newaxis] - 1.25) - lag * np.arange(4)
     found = DrivenRobot.of(Robot.of(scenario), gait).signals_at(times)
     np.testing.assert_allclose(found, 2.0 * np.sin(phases), atol=ERRORS[signals])
-
-
-def test_a_gait_of_other_oscillators_is_refused(scenario, refused):
-    gait = seeded_gait(scenario)
-    with refused(f"gait {gait.name}", "parameters", "'frequency'", "'weight"):
-        Robot.of(scenario.with_changes({"cpg": SINE})).oscillators(gait)
-
-
-@pytest.mark.parametrize(
-    ("cpg", "key"),
-    [
-        ("!Phase {}", "cpg.gain"),
-        ("!Phase {gain: 2 N, frequency: [1 Hz, 0.5 Hz]}", "cpg.frequency"),
-        ("!Phase {gain: 2 N, lag: [3 rad]}", "cpg.lag"),
-        ("!Phase {gain: 2 N, amplitude: [-1, 1]}", "cpg.amplitude[0]"),
-        ("!Phase {gain: 2 N, reach: 1}", "cpg.reach"),
-        ("!Phase {gain: 2 N, signals: listing, feedback: [load]}", "cpg.signals"),
-    ],
-)
-def test_wrong_settings_are_refused_by_their_key(scenario, cpg, key, refused):
-    with refused("scenario thesis", key):
-        scenario.with_changes({"cpg": cpg})
-
-
-def test_mirrored_gaits_are_for_oscillators_that_have_them(scenario, refused):
-    mirrored = scenario.with_changes({"gait_bounds.mirrored": True})
-    with refused("scenario thesis", "gait_bounds.mirrored", "!Phase"):
-        mirrored.with_changes({"cpg": SINE})

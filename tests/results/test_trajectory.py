@@ -81,19 +81,6 @@ def test_bodies_nodes_and_cables_of_any_structure_have_names() -> None:
     assert cable.cable_signal.item() == "first"
 
 
-@pytest.mark.parametrize(
-    ("coordinate", "given", "told"),
-    [
-        ("cable_bodies", "T1-T3", "unknown 'T1-T3'; did you mean 'T1-T2'?"),
-        ("node_body", ["T1", "T9", "T10"], "unknown 'T9', 'T10'; expected one of T1, T2"),
-    ],
-)
-def test_labels_that_a_selection_misses_are_told(coordinate, given, told, refused) -> None:
-    walk = make_walk(bodies=2, duration=0.1)
-    with refused("sel", coordinate, told):
-        walk.sel({coordinate: given})
-
-
 def test_cables_are_selected_by_what_drives_them_their_bodies_and_their_groups() -> None:
     tension = make_walk(bodies=3, duration=0.1).tension
     driven = tension.sel(cable_signal="T2-T3").cable.values.tolist()

@@ -1,7 +1,5 @@
 """Commands: samples that are held, and the robot that follows them."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from helpers.actuations import MOTOR, WINCH
@@ -74,33 +72,3 @@ def test_a_tension_motor_plays_no_spring_and_starts_at_its_first_tension(scenari
     passive = np.delete(robot.structure.cables, robot.driven)
     assert all(passive[name].all() for name in CableLaw._fields)
     assert robot.starting_drives().tolist() == list(range(8))
-
-
-OTHERS = [
-    (7, 3, ("(3, 7)", "(3, 8)")),
-    (24, 3, ("(3, 24)", "(3, 8)")),
-    (8, 0, ("(0, 8)", "(1, 8)")),
-]
-
-
-@pytest.mark.parametrize(
-    ("changes", "key", "fact"),
-    [
-        ({"period": 0.0}, "period", "found 0.0"),
-        ({"period": "1 s"}, "period", "found '1 s'"),
-        ({"samples": [[0.0] * 8]}, "samples", "expected ndarray"),
-        ({"samples": np.full((1, 8), np.nan)}, "samples[0, 0]", "found nan"),
-        ({"samples": np.full((1, 8), "on")}, "samples", "expected finite numbers"),
-    ],
-)
-def test_a_command_without_times_or_numbers_is_refused(scenario, changes, key, fact, refused):
-    with refused("command counting", key, fact):
-        driven_robot(scenario, dataclasses.replace(counting(), **changes))
-
-
-@pytest.mark.parametrize(("cables", "samples", "facts"), OTHERS)
-def test_a_command_for_other_cables_or_without_samples_is_refused(
-    scenario, cables, samples, facts, refused
-):
-    with refused("command counting", "samples", *facts):
-        driven_robot(scenario, counting(cables, samples))

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from helpers.actuations import FORCE, MOTOR, WINCH
 
 from tetra_drake.robot.command import Command
@@ -52,23 +53,11 @@ def test_columns_may_stand_in_any_order(robot, load):
     assert np.array_equal(load(turned).samples, samples)
 
 
-FIRST = "T1-T2 outer bottom_left force_N"
-BAD = {
-    "another cable": ((FIRST, "T1-T9 outer"), "T1-T9 outer", "is no column"),
-    "no time": (("time_s", "time"), "time", "'time_s'"),
-    "twice": ((FIRST, FIRST.replace("left", "right")), FIRST.replace("left", "right"), "twice"),
-    "a column too few": ((FIRST + ",", ""), FIRST, "is missing"),
-    "a cell too many": (("0.010000,", "0.010000,1,"), "line 3", "found 10 cells, expected 9"),
-    "an open quote": (("0.010000,", '0.010000,"'), "", "is no table"),
-    "infinite": (("0.010000,0.500000", "0.010000,inf"), f"line 3, {FIRST}", "'inf'"),
-    "a gap": (("0.030000", "0.030550"), "line 5, time_s", "found 0.03055 after 0.02"),
-    "a late start": (("0.000000,0", "0.005000,0"), "time_s", "the first at 0"),
-}
+BAD = yaml.safe_load(Path(__file__).with_name("bad_commands.yaml").read_text("utf-8"))
 
 
-@pytest.mark.parametrize("wrong", BAD)
-def test_a_bad_file_is_refused(robot, wrong, load, refused):
-    (old, new), key, problem = BAD[wrong]
+@pytest.mark.parametrize(("old", "new", "key", "problem"), BAD)
+def test_a_bad_file_is_refused(robot, old, new, key, problem, load, refused):
     text = command_text(robot, Command("half", 0.01, np.full((5, 8), 0.5)))
     assert old in text
     with refused("c.csv", key, problem):

@@ -61,10 +61,3 @@ def test_the_csv_holds_what_the_cables_are_fed(robot, gait, tmp_path, system, un
     fed = signal_samples(robot, gait)[:30_001] * (steps >= 1.25)[:, np.newaxis] / unit
     expected = [np.interp(times, steps, column) for column in fed.T]
     np.testing.assert_allclose(signals, expected, atol=1e-9)
-
-
-@pytest.mark.parametrize("rate", [0.0, -1.0, 2001.0, float("nan"), float("inf")])
-def test_a_rate_beyond_the_signals_own_is_refused(robot, gait, rate, tmp_path, refused):
-    with refused("rate", "", "Hz"):
-        save_signals(tmp_path / "a.csv", robot, gait, rate=rate)
-    assert not list(tmp_path.iterdir())

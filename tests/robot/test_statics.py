@@ -53,15 +53,6 @@ def forces_on_bodies(joined: Joined, tensions: np.ndarray) -> np.ndarray:
     return cable_wrenches(p_WN=scaled, body_of_node=bodies, segments=segments) @ tensions
 
 
-def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
-    wrenches = cable_wrenches(
-        p_WN=np.array([[0.0, 1.0, 2.0], [3.0, 1.0, 2.0]]),
-        body_of_node=np.array([0, 1]),
-        segments=straight(np.array([[0, 1]])),
-    )
-    assert wrenches.reshape(2, 6).tolist() == [[0, 2, -1, 1, 0, 0], [0, -2, 1, -1, 0, 0]]
-
-
 KNOWN = [(prism(3, 30.0), 1, 1), (prism(3, 31.0), 0, 0), (prism(4, 45.0), 1, 3)]
 KNOWN += [(prism(3, 30.0, radius=1e-6, height=1.5e-6), 1, 1), (shipped("six_bar"), 1, 1)]
 KNOWN += [(nested_tetrahedra(2.0 * 0.0254), 1, 1)]
@@ -94,13 +85,3 @@ def test_the_shipped_spines_balance_without_weight(name: str) -> None:
     tensions = laws[:, 0] * (np.linalg.norm(spans[:, 1] - spans[:, 0], axis=1) - laws[:, 1])
     assert tensions.min() > 1.0
     assert np.abs(forces_on_bodies(joined, tensions)).max() < 0.02 * tensions.min()
-
-
-def test_the_six_cables_of_the_thesis_balance_where_its_spacing_says() -> None:
-    robot = load_scenario("thesis").robot
-    (tensions,) = find_statics(**nested_tetrahedra(robot.spacing)).self_stresses
-    outer, inner = tensions[0], tensions[3]
-    assert tensions == pytest.approx([outer] * 3 + [inner] * 3, rel=1e-9)
-    reach = robot.strut_length * math.sqrt(2.0 / 3.0) - robot.spacing
-    slant = math.hypot(reach, robot.strut_length / math.sqrt(3.0))
-    assert outer == pytest.approx(inner * reach / slant)

@@ -63,10 +63,3 @@ def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
     np.testing.assert_allclose(found, total, rtol=1e-9, atol=1e-15)
     centre = sum(mass * p for mass, p, _ in parts)
     np.testing.assert_allclose(centre, 0.0, atol=1e-15)  # kg m
-
-
-def test_nodes_placed_in_the_ground_are_refused(refused):
-    scenario = load_scenario("prism")
-    sunk = scenario.with_changes({"robot.nodes.n1": ["-5 cm", "8.66 cm", "-1 mm"]})
-    with refused("prism", "robot.nodes.n1", "0.1 cm below"):
-        Robot.of(sunk)

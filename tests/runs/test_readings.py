@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pandas
 import pytest
 import readings
@@ -31,3 +32,12 @@ def test_unknown_readings_and_damaged_records_are_refused(tmp_path):
         readings.load_record(damaged)
     with pytest.raises(InputError, match=r"gain-3.*gain-1"):
         readings.main(["gain-3"])
+
+
+def test_trials_that_end_earlier_do_so_in_the_record():
+    record = readings.load_record(readings.RECORD)
+    ended = {name: [trial["iterations"] for trial in trials] for name, trials in record.items()}
+    for name, reading in readings.ALL.items():
+        if reading.trials_of:
+            whole = ended[reading.trials_of]
+            assert np.less_equal(ended[name], whole).all() and ended[name] != whole, name

@@ -63,7 +63,10 @@ def test_what_kinds_of_a_section_have_in_common_is_told_once():
     )
     assert "- `actuation.max_force` (N, > 0): " in winch.split("\n## ")[0]
     own = motor.split("\n## ")[0]
-    assert "- `actuation.max_force` and `actuation.max_speed`: as for `!Winch`" in own
+    assert (
+        "`actuation.max_force`, `actuation.max_speed`, `actuation.motor` and `actuation.spool`: as"
+        in own
+    )
     assert "- `actuation.time_constant` (s, > 0): " in own  # with another text
     phase = keys_page().split("`cpg`: `!Phase`\n")[1].split("\n## ")[0]
     assert "`cpg.start_up`" in phase and phase.rstrip().endswith("as for `!Matsuoka`")

@@ -42,22 +42,6 @@ def test_another_file_replaces_the_structure_of_the_base(folder: Path) -> None:
     assert given == expected.model_copy(update={"gravity": 0.0})
 
 
-def test_python_names_and_changes_structures_as_a_file_does(folder: Path) -> None:
-    scenario = load(folder, "!Structure {file: own.yaml}")
-    file = str(folder / "own.yaml")
-    assert scenario.robot == read_structure(file)
-    assert (scenario.robot.body_count, scenario.robot.size) == (3, approx(0.1))
-    changes = {"objective": {"speed": "1 s/m"}, "name": "mine"}
-    for robot in ({"robot.file": file}, {"robot": read_structure(file)}):
-        assert load_scenario("thesis").with_changes(changes | robot) == scenario
-    changed = scenario.with_changes({"robot.cables.side.stiffness": "250 N/m"})
-    assert changed.robot.cables["side"].stiffness == 250.0
-    assert changed.with_changes({"robot.cables.side.stiffness": "200 N/m"}) == scenario
-    assert changed.differences(scenario) == [("robot.cables.side.stiffness", "250 N/m")]
-    apart = {"robot.actuated.left": ["side b d"], "robot.actuated.top": ["long e f"]}
-    assert list(scenario.with_changes(apart).robot.actuated) == ["left", "right", "top"]
-
-
 def test_numbers_of_groups_have_dotted_keys(folder: Path) -> None:
     scenario = load(folder, "!Structure {file: own.yaml}")
     assert scenario.numbers()["robot.struts.arm.density"] == approx(1200.0)

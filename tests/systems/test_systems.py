@@ -8,15 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.controllers import OwnGround
 from one_tetrahedron import make_diagram, make_standing_tetrahedron
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from tetra_drake.laws.contact import CONTACT, MODE, MODE_COLUMNS
 from tetra_drake.laws.friction import STICK
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.gait_file import load_gait
-from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario
@@ -89,25 +88,6 @@ def test_a_turn_beyond_its_limits_is_refused_on_the_port_as_by_a_function(turn, 
             steering.get_output_port().Eval(context)
 
 
-# A ground of the user's.
-
-
-class OwnGround(LeafSystem):
-    """Springs under the origins of bodies, or nothing that a diagram could use."""
-
-    def __init__(self, bodies: int, *, force: str = "generalized_force") -> None:
-        super().__init__()
-        self.state = self.DeclareVectorInputPort("state", 13 * bodies)
-        self.DeclareVectorOutputPort(force, 6 * bodies, self.calc)
-        self.DeclareVectorOutputPort("normal_forces", 2, lambda context, output: None)
-
-    def calc(self, context: Context, output: BasicVector) -> None:
-        heights = self.state.Eval(context)[6 : 7 * (output.size() // 6) : 7]
-        force = np.zeros((len(heights), 6))
-        force[:, 5] = 100.0 * np.maximum(0.0, -heights)
-        output.SetFromVector(force.ravel())
-
-
 def test_a_ground_of_ones_own_acts_in_place_of_ours(robot, gait):
     ground = OwnGround(5)
     diagram = MakeTensegrityDiagram(robot, gait, ground=ground)
@@ -126,25 +106,6 @@ def test_a_ground_of_ones_own_acts_in_place_of_ours(robot, gait):
 
     pushed = forces_at(-0.01) - forces_at(1.0)
     np.testing.assert_allclose(pushed, [[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * 5, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("ground", "options", "key", "fact"),
-    [
-        (OwnGround(4), {}, "ground", "52"),
-        (OwnGround(5, force="force"), {}, "ground", "'generalized_force'"),
-        (OwnGround(5), {"modes": np.zeros((11, MODE_COLUMNS))}, "modes", "`ground`"),
-    ],
-)
-def test_a_ground_without_the_ports_is_refused(robot, gait, refused, ground, options, key, fact):
-    with refused("MakeTensegrityDiagram", key, fact):
-        MakeTensegrityDiagram(robot, gait, ground=ground, **options)
-
-
-def test_feedback_needs_a_ground_with_modes(scenario, refused):
-    senses = scenario.with_changes({"cpg.feedback": ["load"]})
-    with refused("MakeTensegrityDiagram", "ground", "'mode_table'"):
-        MakeTensegrityDiagram(Robot.of(senses), seeded_gait(senses), ground=OwnGround(5))
 
 
 @pytest.mark.parametrize("terrain", ["!Flat", "!Incline {slope: 20 deg}"])

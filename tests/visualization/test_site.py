@@ -175,13 +175,7 @@ def test_pages_are_accessible(address, browser, scheme):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     with opened(browser, f"{address}index.html", size=DESK, offline=False) as page:
         page.emulate_media(color_scheme=scheme)
-        for name in (
-            "index",
-            "api",
-            "runs/index",
-            "runs/thesis/THESIS",
-            "tetra_drake/scenario/KEYS",
-        ):
+        for name in READ:
             page.goto(f"{address}{name}.html")
             page.wait_for_timeout(200)  # until the theme has wrapped tables
             report = axe.run(page)

@@ -39,15 +39,14 @@ from tetra_drake.robot.equilibrium import Unactuated, damping_at_rest, mass_matr
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import Phase, Robot
 from tetra_drake.robot.signals import DrivenRobot, Pilot
 from tetra_drake.robot.speed_limit import speed_limit
-from tetra_drake.robot.structure import with_origins
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.systems import GroundContact, HeldSignals, SampledController
-from tetra_drake.systems.diagram import MakeTensegrityDiagram
+from tetra_drake.systems.diagram import MakeTensegrityDiagram, SetStart
 
 _WITNESS_WINDOW = 2e-5  # s; precision of witnessed mode changes for accuracies of 1e-3 and above
 _WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; Drake's isolation window is this times the accuracy
@@ -144,7 +143,7 @@ class _DiagramRobot:
         else:
             diagram = MakeTensegrityDiagram(robot, controller=HeldSignals(robot))
         self._diagram, self._steps = diagram, _Steps.of(robot, settings)
-        self._simulator = _make_simulator(diagram, self._steps)
+        self._simulator = _make_simulator(diagram, robot, self._steps)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
         self._work = _Work(self._simulator)
         self._aimer = _StepAimer(diagram, self._simulator, self._steps, self._work)
@@ -164,7 +163,7 @@ class _DiagramRobot:
             for before, after in itertools.pairwise(robot.phases):
                 # An action at the time of an event is before it, as on the other engines.
                 self._advance_to(after.begins + (SAME_TIME if self._driven.pilot else 0.0))
-                self._become(after.robot, after.p_BC - before.p_BC)
+                self._become(after, before)
             self._advance_to(robot.scenario.simulation.duration)
         except SimulationFailure as failure:
             failure.wall_time = perf_counter() - started
@@ -202,15 +201,14 @@ class _DiagramRobot:
                 holder = self._diagram.GetSubsystemByName("controller")
                 holder.Hold(holder.GetMyMutableContextFromRoot(context), self._changes[stop])
 
-    def _become(self, robot: Robot, p_BC: np.ndarray) -> None:
-        """Goes on with another robot in place of this one, whose nodes move on in the same way. The
-        origins of its bodies' frames are at p_BC (bodies, 3) in m in the frames of the old one."""
+    def _become(self, phase: Phase, before: Phase) -> None:
+        """Goes on with the robot of another phase in place of this one; see Phase.entered()."""
         simulator, aimer, sampler = self._simulator, self._aimer, self._sampler
-        work = self._work.total()
+        work, robot = self._work.total(), phase.robot
         self._build(robot)
         old, context = simulator.get_context(), self._simulator.get_mutable_context()
-        state, bodies = old.get_continuous_state_vector().CopyToVector(), 13 * len(p_BC)
-        state[:bodies] = with_origins(state[:bodies], p_BC)
+        state, bodies = old.get_continuous_state_vector().CopyToVector(), 13 * len(phase.p_BC)
+        state[:bodies] = phase.entered(state[:bodies], before)
         context.SetTime(old.get_time())
         context.SetContinuousState(state)
         for group in range(context.num_discrete_state_groups()):
@@ -255,8 +253,8 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     """Drake's Simulator for a robot's diagram, with the integrator settings of the scenario.
 
     If the scenario sets no target accuracy, it is half of Robot.damping_ratio, but at least 2e-5
-    and at most 5e-3, or 1e-2 where friction is nearly viscous. If it sets no longest step,
-    Robot.longest_step limits it.
+    and at most 5e-3, or 1e-2 where friction is nearly viscous; a tenth of this for robots with
+    joints. If it sets no longest step, Robot.longest_step limits it.
 
     The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
     monitor replaces it.
@@ -265,14 +263,15 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     check_type("MakeSimulator", "robot", robot, Robot)
     check_type("MakeSimulator", "settings", settings, Drake)
     steps = _Steps.of(robot, settings)
-    simulator = _make_simulator(diagram, steps)
+    simulator = _make_simulator(diagram, robot, steps)
     aimer = _StepAimer(diagram, simulator, steps, _Work(simulator))
     simulator.set_monitor(aimer.aim)
     return simulator
 
 
-def _make_simulator(diagram: Diagram, steps: _Steps) -> Simulator:
+def _make_simulator(diagram: Diagram, robot: Robot, steps: _Steps) -> Simulator:
     simulator = Simulator(diagram)
+    SetStart(diagram, simulator.get_mutable_context(), robot)
     integrator = ResetIntegratorFromFlags(simulator, steps.scheme, steps.pace.max_step)
     integrator.set_target_accuracy(steps.accuracy)
     if not steps.at_step_end:
@@ -327,18 +326,19 @@ class _Steps:
     def of(cls, robot: Robot, settings: Drake) -> _Steps:
         """The steps of a robot; see MakeSimulator()."""
         pace = _VISCOUS if robot.scenario.friction.is_viscous else _SLIPPING
-        accuracy = min(pace.coarsest, max(_FINEST, 0.5 * robot.damping_ratio))
+        is_jointed = robot.model.joints.node_a.size > 0
+        coarsest = 0.1 * pace.coarsest if is_jointed else pace.coarsest
+        accuracy = min(coarsest, max(_FINEST, 0.5 * robot.damping_ratio))
         longest = settings.max_step or min(pace.max_step, robot.longest_step)
         pace = pace._replace(max_step=longest)
         if settings.look_ahead is not None:
             pace = pace._replace(look_ahead=settings.look_ahead)
-        is_held = robot.model.anchors.nodes.size + robot.model.joints.node_a.size > 0
         return cls(
             scheme=settings.scheme or default_scheme(robot),
             accuracy=settings.accuracy or accuracy,
             at_step_end=settings.mode_changes == "step_end",
             pace=pace,
-            renewal=_RENEWAL if is_held else math.inf,
+            renewal=_RENEWAL if is_jointed or robot.model.anchors.nodes.size else math.inf,
         )
 
 
@@ -355,6 +355,8 @@ def default_scheme(robot: Robot) -> str:
         return "radau3"
     unactuated = Unactuated(robot.model)
     damping = damping_at_rest(unactuated, robot.structure.initial_state)
+    if not damping.any():
+        return "runge_kutta3"
     matrices = csc_array(damping), csc_array(mass_matrix(unactuated))
     rate = eigsh(matrices[0], 1, matrices[1], which="LA", return_eigenvectors=False)[0]
     return "runge_kutta3" if rate < _RATE_PER_SQUARE * bodies**2 else "radau3"

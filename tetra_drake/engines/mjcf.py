@@ -15,7 +15,7 @@ from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.actuator import has_drive
-from tetra_drake.laws.cable import tendon_faults
+from tetra_drake.laws.cable import tendon_coefficients, tendon_faults
 from tetra_drake.laws.contact import NormalForce
 from tetra_drake.laws.inertia import XX
 from tetra_drake.robot.robot import Robot
@@ -25,6 +25,7 @@ from tetra_drake.robot.structure import (
     PASSIVE_COLOUR,
     STRUT_COLOUR,
     Structure,
+    rotated,
 )
 from tetra_drake.robot.xml_elements import add_comment, add_element, xml_text
 from tetra_drake.scenario.engine_kinds import Mujoco
@@ -74,8 +75,9 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
 
     Args:
         robot: the robot at its start.
-        rest: state [q; v] (13*bodies,) whose poses become a key frame with the name `rest`; None
-            for no key frame.
+        rest: state [q; v] (13*bodies,) that becomes a key frame with the name `rest`, beside which
+            there is a key frame `start` if the settings have a `start`. Without it there is a key
+            frame `start` if the robot moves.
         own_laws: True for an engine that computes contacts of struts by its own law, and tensions
             where is_pulled() is true. The model then leaves these to the engine.
 
@@ -104,10 +106,11 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     for node in range(structure.first_node[-1], len(structure.node_names)):  # fixed nodes
         add_element(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
     _add_bodies(model, world, robot)
-    if rest is not None:
-        poses = rest[: 7 * len(structure.bodies)].reshape(-1, 7)
-        qpos = np.hstack([poses[:, 4:], poses[:, :4]])
-        add_element(add_element(model, "keyframe"), "key", name="rest", qpos=qpos)
+    moving = structure if rest is None or not scenario.robot.start else Robot.of(scenario).structure
+    states = {"rest": rest, "start": None if moving.v_WB is None else moving.initial_state}
+    for name, state in states.items():
+        if state is not None:
+            _add_key(model, structure, name, state)
     if robot.model.strut_contact.acts and not own_laws:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot, pulled=pulled)
@@ -181,12 +184,12 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
         mass, inertia = bodies.mass[i], bodies.inertia[i]
         principal = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())
         nodes = range(structure.first_node[i], structure.first_node[i + 1])
-        feet = structure.contact_radius[[node for node in nodes if node in structure.contacts]]
-        is_bar = len(nodes) == 2 and not feet.any() and i not in structure.given_inertia
+        is_bar = _bar_axis(structure, i).any()
         if is_bar:
             # A bar gets a larger moment of inertia about its axis: the same as across it. A spin
-            # about the axis moves no node, and cables cause none. But MuJoCo's contact points are
-            # above the nodes by half the depth, so friction would soon spin a thin bar.
+            # about the axis moves no node; bars start without it, and cables cause none. But
+            # MuJoCo's contact points are above the nodes by half the depth, so friction would soon
+            # spin a thin bar.
             moments = {"diaginertia": 3 * [principal[-1]]}
         elif structure.isotropic:
             moments = {"diaginertia": 3 * [inertia[XX]]}
@@ -214,12 +217,36 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
             add_element(body, "geom", **geom, rgba=STRUT_COLOUR, **_ALONE)
 
 
+def _bar_axis(structure: Structure, body: int) -> np.ndarray:
+    """Unit vector (3,) along a body that is a bar, in the body's frame; zero for other bodies."""
+    first, end = structure.first_node[body : body + 2]
+    feet = np.intersect1d(range(first, end), structure.contacts).astype(int)
+    if end - first != 2 or structure.contact_radius[feet].any() or body in structure.given_inertia:
+        return np.zeros(3)
+    length = structure.p_BN[end - 1] - structure.p_BN[first]
+    return np.asarray(length / np.linalg.norm(length))
+
+
+def _add_key(model: Element, structure: Structure, name: str, state: np.ndarray) -> None:
+    """Adds a key frame for a state [q; v] (13*bodies,). Bars do not spin about their axes."""
+    poses, velocities = np.split(state, [7 * len(structure.bodies)])
+    q_WB, p_WB = np.split(poses.reshape(-1, 7), [4], axis=1)
+    w_WB, v_WB = np.split(velocities.reshape(-1, 6), 2, axis=1)
+    w_WB_B = rotated(q_WB * [1.0, -1.0, -1.0, -1.0], w_WB)
+    axes = np.array([_bar_axis(structure, body) for body in range(len(structure.bodies))])
+    w_WB_B = w_WB_B - axes * (axes * w_WB_B).sum(axis=1, keepdims=True)
+    motion = {"qvel": np.hstack([v_WB, w_WB_B])} if velocities.any() else {}
+    keys = add_element(model, "keyframe")
+    add_element(keys, "key", name=name, qpos=np.hstack([p_WB, q_WB]), **motion)
+
+
 def _contact(robot: Robot, mass: float) -> dict:
     """Attributes of an MJCF contact pair of the floor and a node of a body of this mass (kg)."""
-    ground = robot.scenario.ground
+    ground, structure = robot.scenario.ground, robot.structure
     cone = robot.scenario.friction.cone(robot.scenario.name)
-    # Nodes that bear the weight are as in the blueprint, or in equilibrium.
-    borne = robot.weight / (robot.structure.feet or max(1, robot.equilibrium.feet))
+    # Nodes that bear the weight are as in the blueprint, or in equilibrium if there is one.
+    known, at_rest = structure.feet, structure.equilibrium
+    borne = robot.weight / max(1, known or (at_rest.feet if at_rest else len(structure.contacts)))
     rest_damping = ground.damping * borne / ground.stiffness
     # MuJoCo's numbers are per mass, divided by 1 - impedance, and for friction multiplied by
     # impratio. Negative numbers mean stiffness and damping.
@@ -267,7 +294,8 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
     width = structure.least_radius / 2
     for number, cable in enumerate(structure.cables):
         name = structure.cable_names[number]
-        law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
+        coefficients = tendon_coefficients(cable["curve"]) or cable["stiffness"]
+        law = {"stiffness": coefficients, "damping": cable["damping"]}
         least = 0.0 if structure.slack else cable["free_length"]
         springlength = [least, cable["free_length"]]  # the spring exerts no force in between
         colour = ACTUATED_COLOUR if name in motors else PASSIVE_COLOUR

@@ -36,7 +36,7 @@ from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudg
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws.actuator import DRIVE, DRIVE_COLUMNS, RATE
-from tetra_drake.laws.cable import PASSIVE
+from tetra_drake.laws.cable import LENGTH, PASSIVE, steepest
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.laws.forces import Forces, Parts, compute_strut_forces, pull_of_cable
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
@@ -50,10 +50,10 @@ from tetra_drake.robot.equilibrium import (
 )
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import Phase, Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
-from tetra_drake.robot.structure import with_origins
+from tetra_drake.robot.structure import rotated
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.world import World
 
@@ -101,7 +101,9 @@ def is_stable(robot: Robot, step: float) -> bool:
     taut = Unactuated(robot.model._replace(slack=False, anchors=free))
     force_at_rest(taut, robot.structure.initial_state)
     taut.forces.near_struts.count[:] = 0
-    stiffer = cables.law._replace(stiffness=cables.law.stiffness + 2.0 / step * cables.law.damping)
+    law, lengths = cables.law, taut.forces.cable_forces[:, LENGTH]
+    stiffness = steepest(lengths - law.free_length, law) + 2.0 / step * law.damping
+    stiffer = law._replace(stiffness=stiffness, curve=law.curve._replace(pieces=0))
     taut.model = taut.model._replace(cables=cables._replace(law=stiffer))
     stiffness = stiffness_at_rest(taut).toarray()
     return bool(eigvalsh(step**2 * stiffness, mass_matrix(taut)).max() < 4.0)
@@ -177,21 +179,23 @@ class _MujocoRobot:
             problem = "is too long for the robot's springs or dampers"
             raise Diverged(time=0.0, reason=f"engine.step, {self._step:g} s, {problem}")
         self._data = mujoco.MjData(self._model)
+        if self._model.nkey:
+            mujoco.mj_resetDataKeyframe(self._model, self._data, 0)
 
     def simulated(self) -> SimulationResult:
         """The result at the end of the simulation. Raises Diverged."""
         pilot, phases = self._driven.pilot, self._driven.robot.phases
-        changes = [(b.begins, b.robot, b.p_BC - a.p_BC) for a, b in itertools.pairwise(phases)]
+        changes = [*itertools.pairwise(phases)]
         action = pilot.acts_after(0.0) if pilot else math.inf
         end, started = self._driven.robot.scenario.simulation.duration, perf_counter()
         try:
-            while (now := min(action, changes[0][0] if changes else end)) < end:
+            while (now := min(action, changes[0][1].begins if changes else end)) < end:
                 self._advance_to(now)
                 if pilot and action <= now + SAME_TIME:
                     signals = signals_of_one(pilot, self._readings())
                     self._before, self._held, self._began = self._held, signals, now
                     action = pilot.acts_after(action)
-                while changes and changes[0][0] <= now + SAME_TIME:
+                while changes and changes[0][1].begins <= now + SAME_TIME:
                     self._become(*changes.pop(0))
             self._advance_to(end)
         except SimulationFailure as failure:
@@ -212,26 +216,25 @@ class _MujocoRobot:
             record=self._record,
         )
 
-    def _become(self, now: float, robot: Robot, p_BC: Array) -> None:
-        """Goes on from now on (s) with another robot in place of this one, whose nodes move on in
-        the same way. The origins of its bodies' frames are at p_BC (bodies, 3) in m in the frames
-        of the old one."""
-        passed = int(np.searchsorted(self._times, now, side="right"))
+    def _become(self, before: Phase, phase: Phase) -> None:
+        """Goes on with the robot of another phase in place of this one; see Phase.entered()."""
+        robot, passed = phase.robot, int(np.searchsorted(self._times, phase.begins, side="right"))
         self._motions.append(self._kept(slice(self._known, passed)))
         self._robot, self._known = robot, passed
         self._make_model()
         self._observer.follow(robot)
         # The last step may end after the event, with a sample.
-        self._state = self._moved(self._state[np.newaxis], p_BC)[0]
-        self._states_kept[passed:] = self._moved(self._states_kept[passed:], p_BC)
+        self._state = self._moved(self._state[np.newaxis], before, phase)[0]
+        self._states_kept[passed:] = self._moved(self._states_kept[passed:], before, phase)
 
-    def _moved(self, states: Array, p_BC: Array) -> Array:
-        """MuJoCo's states (rows, numbers) of the same motion, after the origins of the bodies'
-        frames were moved to p_BC (bodies, 3) in m."""
-        moved, after = states.copy(), with_origins(self._body_states(states), p_BC)
-        bodies = np.arange(len(p_BC))[:, np.newaxis]
+    def _moved(self, states: Array, before: Phase, phase: Phase) -> Array:
+        """MuJoCo's states (rows, numbers) at the beginning of a phase; see Phase.entered()."""
+        old, moved = self._body_states(states), states.copy()
+        after, bodies = phase.entered(old, before), np.arange(len(phase.p_BC))[:, np.newaxis]
         p, v = 7 * bodies + np.arange(3), self._model.nq + 6 * bodies + np.arange(3)
+        back = after[:, 7 * bodies + np.arange(4)] * [1.0, -1.0, -1.0, -1.0]
         moved[:, 1 + p], moved[:, 1 + v] = after[:, 4 + p], after[:, 3 + v]
+        moved[:, 4 + v] += rotated(back, after[:, v] - old[:, v])  # 0 without a push
         return moved
 
     def _advance_to(self, time: float) -> None:

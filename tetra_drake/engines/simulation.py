@@ -24,12 +24,13 @@ from tetra_drake.errors import (
     check_whole,
     checked_numbers,
 )
-from tetra_drake.laws.cable import CableLaw
+from tetra_drake.laws.cable import NUMBERS, CableLaw
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import checked_actions, checked_period, controlled_robot
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.sensors import Sensors
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.events import Event, check_taken
@@ -62,6 +63,9 @@ class Simulation:
     that takes one `cpg.listing_step`; the first action acts from the start on. There is no network
     and no start-up time. Steps with the samples of a command give the motion of
     simulate(command=...), if each sample differs from the one before.
+
+    The readings that methods return are what the sensors show, with the errors of `sensing`;
+    `state` is exact.
 
     One thread at a time may use a simulation. If a step is interrupted, as by Ctrl-C, reset() puts
     all robots at their start; until then the other methods refuse. A simulation can be used after a
@@ -115,8 +119,10 @@ class Simulation:
         self._batch = self._new_batch()
         self._owner, self._is_whole = threading.RLock(), True
         shape = count, self.robot.driven.size
-        self._law: Any = CableLaw._make(np.empty((len(CableLaw._fields), *shape)))
+        self._law: Any = CableLaw(*np.empty((len(NUMBERS), *shape)))
         self._steps = np.zeros(count, dtype=int)
+        self._sensors: dict[int, Sensors] = {}
+        """Sensors of the robots by their places; none without a section `sensing`."""
         self.rest: np.ndarray = np.empty(shape)
         """Actions (N, actions) at the start, where the robots rest."""
         self.reset()
@@ -131,9 +137,16 @@ class Simulation:
 
     @property
     def state(self) -> Readings:
-        """The readings of all robots now."""
+        """The exact readings of all robots now."""
         with self._used("state"):
             return self._batch.readings.copied()
+
+    def _seen(self) -> Readings:
+        """What the sensors of all robots show now; without a section `sensing`, the state."""
+        seen = self.state
+        for place, sensors in self._sensors.items():
+            seen.put(place, sensors(seen.rows(place).copied()))
+        return seen
 
     @property
     def ended(self) -> np.ndarray:
@@ -149,8 +162,8 @@ class Simulation:
         """Puts robots at their start, and returns the readings of all robots.
 
         Args:
-            seed: seed of the scenario's disturbances, which are different for each robot. Or a
-                seed for each robot: it is disturbed like a robot alone with this seed. None for
+            seed: seed of the scenario's disturbances and of the errors of its sensors, which are
+                different for each robot. Or a seed for each robot, as for a robot alone. None for
                 robots without disturbances.
             indices: the robots; all by default.
 
@@ -167,7 +180,7 @@ class Simulation:
 
         with self._used("reset", is_whole=self._is_whole or len(set(places)) == self.count):
             identities = [_UNDISTURBED] * len(places)
-            if seed is not None and self.scenario.disturbances is not None:
+            if seed is not None and (self.scenario.disturbances or self.scenario.sensing):
                 numbers_of_robots = [0] * len(places) if is_list(seed) else places
                 seeds = zip(given, numbers_of_robots, strict=True)
                 identities = [json.dumps({"seed": each, "damage": []}) for each in seeds]
@@ -177,12 +190,14 @@ class Simulation:
             self._is_whole = False
             for place, identity, robot in zip(places, identities, robots, strict=True):
                 self._put(place, identity, robot)
+                if robot.scenario.sensing:
+                    self._sensors[place] = Sensors(robot.scenario, self.control_period)
                 self._batch.stop(place)
                 self._steps[place] = 0
                 first = self._first_readings if robot is self.robot else first_readings(robot)
                 self._batch.readings.put(place, first)
             self._is_whole = True
-            return self.state
+            return self._seen()
 
     def step(self, actions: npt.ArrayLike, *, indices: Indices = None) -> Readings:
         """Simulates one control period, and returns the readings of all robots.
@@ -218,7 +233,7 @@ class Simulation:
             self._batch.advance(np.where(goes, self._time_after(self._steps + 1), 0.0), signals)
             self._steps[goes] += 1
             self._is_whole = True
-            return self.state
+            return self._seen()
 
     def result(self, place: int = 0) -> SimulationResult:
         """Result of robot number `place`, after it has reached the end. Raises its failure if it
@@ -260,6 +275,9 @@ class Simulation:
                 if self._steps[place] == 0:
                     self._begin(place, self._driven(self._robots[place]))
             tables = self._batch.save(which, history=history)
+            for name in Readings._fields if self._sensors else ():
+                rows = [[getattr(one, name) for one in self._sensors[k].recent] for k in which]
+                tables[f"sensors.{name}"] = np.array(rows)
             return States(
                 scenario=self.scenario.name,
                 identity=self._identity,
@@ -317,9 +335,14 @@ class Simulation:
                 if is_other or self._steps[place] == 0 or self.failures[place]:
                     self._begin(place, driven[identity])
             self._batch.restore(which, own)
+            for row, place in enumerate(which if self._sensors else ()):
+                sensors = Sensors(self._robots[place].scenario, self.control_period)
+                self._sensors[place] = sensors
+                recent = [own[f"sensors.{name}"][row] for name in Readings._fields]
+                sensors.recent = [Readings(*each) for each in zip(*recent, strict=True)]
             self._steps[which] = steps
             self._is_whole = True
-            return self.state
+            return self._seen()
 
     def copy(self, place: int, *, to: Indices, history: bool = False) -> Readings:
         """Puts robots into the state of robot number `place`, and returns the readings of all.
@@ -442,7 +465,7 @@ class Simulation:
     def _put(self, place: int, identity: str, robot: Robot) -> None:
         """Makes a robot the one of a place, before it begins there."""
         cables = robot.starting_cables()
-        for values, its in zip(self._law, cables.law, strict=True):
+        for values, its in zip(self._law[:-1], cables.law[:-1], strict=True):
             values[place] = its
         self.rest[place] = robot.scenario.actuation.commands(cables)
         self._robots[place], self._identities[place] = robot, identity

@@ -212,8 +212,9 @@ overload(floor)(lambda x: lambda x: _floor(x))
 
 
 def select(mask: Truth, x: Real, y: Real) -> Real:
-    """x in lanes where the mask is true, y in other lanes. Both are computed in all lanes."""
-    return x if mask else y
+    """x in lanes where the mask is true, y in other lanes. Both are computed in all lanes. From
+    Python also for arrays."""
+    return np.where(mask, x, y)[()]  # type: ignore[return-value]
 
 
 @_intrinsic

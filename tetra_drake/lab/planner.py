@@ -139,7 +139,7 @@ class Planner:
 
         # The model's time begins at each decision anew, so that it needs little memory.
         duration = step * (self._steps + self._ahead + 2)
-        alone = scenario.with_sections(events=[], disturbances=None, policy=None, evolve={})
+        alone = scenario.undisturbed().with_sections(policy=None, evolve={}, sensing=None)
         model = alone.with_numbers({"simulation.duration": duration})
         robot = Robot.of(model)
         if not robot.driven.size:

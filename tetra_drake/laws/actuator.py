@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, named, select
@@ -35,7 +35,9 @@ from tetra_drake.laws.cable import (
     slack_tension,
 )
 from tetra_drake.settings.quantities import ForceQuantity, Length, Speed, Time
+from tetra_drake.settings.refusals import hint, refuse
 from tetra_drake.settings.section import Kinds, Section
+from tetra_drake.settings.units import quantity_to_si
 
 LIMITS = "limited actuators"
 """Name of a property of robots: their actuators have limits. Some metrics need it."""
@@ -327,8 +329,19 @@ class Force(ActuatorKind):
     keeps_spring = True
 
 
+MOTORS = {"AX-12A": (1.5, 59.0), "XM540-W270": (10.6, 30.0), "Pololu-4743": (2.06, 200.0)}
+"""Stall torque (N m) and no-load speed (revolutions per minute) of motors with gears at 12 V. The
+first two are from emanual.robotis.com/docs/en/dxl, pages ax-12a and xm540-w270; the third is from
+Pololu's data sheet "37D Metal Gearmotors", Rev 1.2 (50:1, 210 kg mm)."""
+
+
 class LimitedActuator(ActuatorKind):
     """An actuator of limited force and speed on each driven cable. The cable never pushes."""
+
+    keys_of_files: ClassVar = {
+        "motor": f"Motor whose data sheet gives max_force and max_speed: {', '.join(MOTORS)}.",
+        "spool": "Radius of the spool that this motor turns.",
+    }
 
     max_force: ForceQuantity = Field(gt=0)
     """Tension at which the actuator stalls. A greater tension pulls a winch backward."""
@@ -336,6 +349,25 @@ class LimitedActuator(ActuatorKind):
     """Speed at which the actuator winds a cable without tension."""
     time_constant: Time = Field(gt=0)
     """Time constant of the lag with which the actuator follows its command."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_motor(cls, tree: Any) -> Any:
+        """Replaces a motor and its spool by a force and a speed."""
+        if not isinstance(tree, dict) or not cls.keys_of_files.keys() & tree.keys():
+            return tree
+        given = {"motor": "", "spool": ""} | tree
+        motor, spool = str(given.pop("motor")), str(given.pop("spool"))
+        if motor not in MOTORS:
+            refuse("motor", f"found '{motor}'; {hint(motor, MOTORS)}")
+        try:
+            torque, speed, radius = *MOTORS[motor], quantity_to_si(spool, "m")
+        except ValueError as error:
+            refuse("spool", str(error))
+        if radius <= 0.0:
+            refuse("spool", f"found '{spool}', expected a radius above 0")
+        winds = speed * math.tau / 60.0 * radius
+        return given | {"max_force": f"{torque / radius!r} N", "max_speed": f"{winds!r} m/s"}
 
 
 class Winch(LimitedActuator):

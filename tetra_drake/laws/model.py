@@ -8,7 +8,7 @@ import numpy as np
 
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.laws.actuator import Actuator, Force
-from tetra_drake.laws.cable import CABLE, Cables
+from tetra_drake.laws.cable import Cables, cable_type
 from tetra_drake.laws.capsules import StrutContactLaw
 from tetra_drake.laws.contact import Ground
 from tetra_drake.laws.struts import Struts
@@ -146,7 +146,7 @@ class Model(NamedTuple):
         return cls(
             p_BN=p_BN,
             first_node=first_node,
-            cables=cables or Cables.of(np.zeros(0, dtype=CABLE)),
+            cables=cables or Cables.of(np.zeros(0, cable_type(0))),
             actuator=actuator or Force().actuator(),
             couplings=Couplings(no_index, no_index, first[:1], no_index),
             ground=ground or Ground.nowhere(),

@@ -181,7 +181,7 @@ def load_result(folder: str | Path) -> SimulationResult:
         raise InputError(path, f"metrics.{unknown[0]}", "is missing")
     if unknown:
         _LOG.warning("%s: made without the metrics %s, which are NaN", path, ", ".join(unknown))
-    metrics = dict.fromkeys(METRICS) | {"lifted_shares": ""} | file.metrics
+    metrics: dict[str, Any] = dict.fromkeys(METRICS) | {"lifted_shares": ""} | file.metrics
     if wrong := wrong_metric(metrics):
         raise InputError(path, f"metrics.{wrong}", "is missing, or of a wrong type")
     numbers = {name: math.nan if metrics[name] is None else metrics[name] for name in METRICS}

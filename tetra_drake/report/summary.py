@@ -13,6 +13,7 @@ from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.formatting import TextTable, fixed, rounded, sentence, uncertain
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.remarks import (
+    overload_remark,
     sinking_remark,
     start_up_remark,
     stillness_remark,
@@ -108,7 +109,9 @@ def result_text(result: SimulationResult) -> str:
         lines.append("A cable had to push: this gait cannot be built.")
     robot = result.robot
     still = stillness_remark(robot, vars(metrics)) if result.gait else ""
-    remarks = start_up_remark(robot) or still, sinking_remark(robot), yielding_remark(robot)
+    remarks = [start_up_remark(robot) or still, sinking_remark(robot), yielding_remark(robot)]
+    if result.recorded is not None:
+        remarks.append(overload_remark(robot, result.trajectory.tension.max("time").values))
     lines += [sentence(remark) for remark in remarks if remark]
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]

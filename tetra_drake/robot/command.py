@@ -13,11 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.errors import InputError, check_type, checked_numbers
-from tetra_drake.laws.cable import CableLaw
+from tetra_drake.laws.cable import CableLaw, Curve
 from tetra_drake.robot.gait import Gait, check_parameters
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.sensors import Sensors
 from tetra_drake.robot.signals import DrivenRobot, LoopLaw, Pilot
 from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.scenario.policies import DrivenRobots
@@ -175,7 +176,8 @@ def _looped(
         size=np.array(size),
     )
     end = scenario.simulation.duration
-    pilot = Pilot(law=law, values=values, robots=robots, period=period, end=end)
+    seen = Sensors(scenario, period) if scenario.sensing else None
+    pilot = Pilot(law=law, values=values, robots=robots, period=period, end=end, seen=seen)
     samples = signals_of_one(pilot, first_readings(controlled))[np.newaxis]
     controlled = dataclasses.replace(controlled, first_signals=samples[0])
     name = gait.name if gait else ""
@@ -200,7 +202,11 @@ def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
         arrays = [pilot.robots[2:] for pilot in some]
         together = DrivenRobots(*some[0].robots[:2], *_stacked(arrays))
         values = np.array([pilot.values for pilot in some])
-        given, shape = some[0].law(together, readings.rows(rows), values), signals[rows].shape
+        shown = readings.rows(rows)
+        for row, pilot in enumerate(some):
+            if pilot.seen:
+                shown.put(row, pilot.seen(shown.rows(row).copied()))
+        given, shape = some[0].law(together, shown, values), signals[rows].shape
         source = some[0].source
         signals[rows] = checked_numbers(given, shape, source=source, key="signals", finite=True)
     return signals
@@ -210,5 +216,7 @@ def _stacked(parts: Sequence[Any]) -> Any:
     """Named tuple of arrays, nested ones included, that stacks the arrays of several robots."""
     if not isinstance(parts[0], tuple):
         return np.stack(parts)
+    if isinstance(parts[0], Curve):
+        return Curve.stacked(parts)
     fields = [_stacked(each) for each in zip(*parts, strict=True)]
     return type(parts[0])._make(fields) if hasattr(parts[0], "_make") else fields

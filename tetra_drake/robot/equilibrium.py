@@ -479,8 +479,9 @@ def force_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     all numbers are in N. Contact nodes stick where they are, so friction exerts no force. The
     arrays in `robot.forces` are overwritten."""
     modes = np.zeros((len(robot.forces.ground_forces), MODE_COLUMNS))
-    force = np.empty(6 * robot.model.bodies.mass.size)
-    compute_forces_at_rest(robot.parts, state, modes, force)
+    force = np.zeros(6 * robot.model.bodies.mass.size)
+    still = np.concatenate([state[: -force.size], force])
+    compute_forces_at_rest(robot.parts, still, modes, force)
     force.reshape(-1, 6)[:, :3] /= robot.radius
     return force
 

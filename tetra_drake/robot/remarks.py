@@ -129,6 +129,17 @@ def yielding_remark(robot: Robot) -> str:
     return f"{gives}; {needed} would hold it{light}"
 
 
+def overload_remark(robot: Robot, tensions: np.ndarray) -> str:
+    """Remark on the cable whose tension, of the greatest `tensions` (cables,) in N, exceeds its
+    limit most; see `max_tension` and `max_stretch` of cables. It is "" if none does."""
+    limits, units = robot.structure.cable_limits, robot.scenario.units
+    if not limits.size or (tensions <= limits).all():
+        return ""
+    most = int((tensions / limits).argmax())
+    reached, limit = (units.shown(x[most], "N") for x in (tensions, limits))
+    return f"{robot.structure.cable_names[most]} reaches {reached}, its limit is {limit}"
+
+
 def _equilibrium(robot: Robot) -> Equilibrium | None:
     """The equilibrium of a robot; None if it has none."""
     try:

@@ -34,6 +34,7 @@ from tetra_drake.robot.equilibrium import (
 )
 from tetra_drake.robot.gait import Gait, check_parameters
 from tetra_drake.robot.ground import lift, make_ground
+from tetra_drake.robot.start import pushed, started
 from tetra_drake.robot.steering import SteeringSignal, checked_turn
 from tetra_drake.robot.structure import Structure, with_origins
 from tetra_drake.robot.struts import (
@@ -44,6 +45,7 @@ from tetra_drake.robot.struts import (
     strut_contact_law,
 )
 from tetra_drake.scenario.events import Event, blueprint_after, up_to_each
+from tetra_drake.scenario.start import Push
 from tetra_drake.scenario.world import World
 
 MOST_CORRECTIONS = 100
@@ -72,30 +74,33 @@ class Robot:
 
     @classmethod
     def of(cls, scenario: World, *, at_rest: bool = False) -> Self:
-        """The robot of a scenario at its start: in equilibrium if its settings say so, then moved
-        by the offsets of its bodies, on the scenario's terrain.
+        """The robot of a scenario at its start: in equilibrium if its settings say so, then turned
+        by its `start` and moved by the offsets of its bodies, on the scenario's terrain.
 
         Args:
-            at_rest: leaves out the offsets and the events. Also allows struts to overlap at the
-                positions of the settings, because the search for the equilibrium may move them
-                apart.
+            at_rest: leaves out the start, the offsets and the events. Also allows struts to overlap
+                at the positions of the settings, because the search for the equilibrium may move
+                them apart.
 
         Raises:
             InputError: if the robot has no equilibrium, or would start in the ground, outside its
-                terrain or with struts that overlap.
+                terrain or with struts that overlap, or its start moves what is held.
         """
         scenario = scenario.with_sections(events=[]) if at_rest else scenario
         placed = structure = _placed(scenario)
         check_apart(scenario, placed, may_overlap=at_rest)
         model = make_model(scenario.with_sections(terrain=Flat()), placed)
-        if placed.settles:
+        start = None if at_rest else placed.start
+        if placed.settles and (start is None or start.rest):
             structure, model = _settled(scenario, placed, model)
-
+        if start:
+            structure = started(scenario, structure, start)
         if placed.offsets.any() and not at_rest:
             # Nothing moves along an axis that an anchor holds.
             offsets, anchors = placed.offsets.copy(), placed.anchors
             np.multiply.at(offsets, anchors.carriers, anchors.stiffness == 0.0)
             structure = dataclasses.replace(structure, p_WB=structure.p_WB + offsets)
+        if not at_rest and (start or placed.offsets.any()):
             check_apart(scenario, structure)
 
         slope = scenario.terrain.plane_slope or 0.0
@@ -119,7 +124,8 @@ class Robot:
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
-                laws[number] = dict.fromkeys(laws[number], 0.0)
+                law = laws[number].items()
+                laws[number] = {k: x.scaled(0.0) if k == "curve" else 0.0 for k, x in law}
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),
@@ -167,7 +173,10 @@ class Robot:
             return self.before.equilibrium
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
-        return equilibrium_of(self.scenario, _placed(self.scenario))
+        placed = _placed(self.scenario)
+        if placed.settles:
+            return Robot.of(self.scenario, at_rest=True).equilibrium
+        return equilibrium_of(self.scenario, placed)
 
     @functools.cached_property
     def damping_ratio(self) -> float:
@@ -246,7 +255,7 @@ class Robot:
         robot = dataclasses.replace(
             self, scenario=changed, structure=structure, model=model, before=self
         )
-        return Phase(events[-1].at, robot, p_BC)
+        return Phase(events[-1].at, robot, p_BC, events[-1].push)
 
     def oscillators(self, gait: Gait) -> Oscillators:
         """Oscillators with the numbers of a gait, for kernels. Raises InputError if the gait does
@@ -324,6 +333,14 @@ class Phase:
     p_BC: np.ndarray
     """Positions (bodies, 3) in m of its bodies' centres of mass, the origins of their frames now,
     in the frames that they have at t = 0."""
+    push: Push | None = None
+    """Push at its beginning."""
+
+    def entered(self, states: np.ndarray, before: Phase) -> np.ndarray:
+        """States [q; v] (..., 13*bodies) at the beginning of this phase, from those at the end of
+        the phase `before`. The nodes are at the same places, and move on unless they are pushed."""
+        states = with_origins(states, self.p_BC - before.p_BC)
+        return pushed(states, self.robot.structure, self.push) if self.push else states
 
 
 def _placed(scenario: World) -> Structure:

@@ -49,6 +49,8 @@ class Pilot:
     """Time (s) between actions, a multiple of `cpg.listing_step`."""
     end: float
     """Time (s) of the end of the simulation, before which the last action is."""
+    seen: Callable[[Any], Any] | None
+    """What the robot's sensors show of its exact Readings; None for the same."""
 
     @functools.cached_property
     def kind(self) -> str:

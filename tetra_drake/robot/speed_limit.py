@@ -21,10 +21,10 @@ def speed_limit(driven: DrivenRobot) -> float:
     default a speed that the robot cannot reach.
 
     The default is the speed of the lightest body if it had all possible energy. This is the energy
-    of a fall from the robot's top to the lowest ground, of the cables at the start, and of a pull
-    by each actuator over the length of its cable. To it is added the speed that loads, and the
-    weight downhill or without ground, can give the whole robot in the duration. The default is at
-    least 10.16 m/s (LEAST_LIMIT).
+    of a fall from the robot's top to the lowest ground, of the cables and of the motion at the
+    start, and of a pull by each actuator over the length of its cable. To it are added the speed
+    that loads, and the weight downhill or without ground, can give the whole robot in the duration,
+    and what pushes can give the lightest body. The default is at least 10.16 m/s (LEAST_LIMIT).
     """
     robot = driven.robot
     scenario, structure = robot.scenario, robot.structure
@@ -44,8 +44,14 @@ def speed_limit(driven: DrivenRobot) -> float:
     # A pull is at most the force that stretches the cable by its whole length.
     pulls = np.minimum(pull, elastic_tension(length, law)) * length
     energy = float(np.sum(elastic_energy(stretch, law)) + pulls[robot.driven].sum())
+    if structure.v_WB is not None:
+        spins, speeds = (structure.v_WB.reshape(-1, 2, 3) ** 2).sum(axis=2).T
+        moments = 0.5 * structure.unit_inertia[:, :3].sum(axis=1)  # no axis has a larger one
+        energy += float(0.5 * structure.mass @ (speeds + moments * spins))
     speed = math.sqrt(2.0 * (robot.weight * fall + energy))
     speed /= math.sqrt(structure.mass.min())
+    pushes = [event.push.impulse for event in scenario.events if event.push]
+    speed += sum(map(np.linalg.norm, pushes)) / structure.mass.min()
     downhill = math.sin(abs(slope or 0.0)) if structure.contacts.size else 1.0
     pushed = np.linalg.norm(structure.node_load, axis=1).sum() / structure.mass.sum()
     acceleration = downhill * scenario.robot.gravity + pushed

@@ -53,6 +53,9 @@ class Structure(Blueprint):
     """Positions of the bodies (bodies, 3) at t = 0."""
     q_WB: np.ndarray
     """Quaternions of the bodies (bodies, 4) at t = 0, w first."""
+    v_WB: np.ndarray | None = None
+    """Angular velocities (rad/s) and velocities (m/s) of the bodies (bodies, 6) at t = 0. None if
+    they rest."""
     equilibrium: Equilibrium | None = None
     """Equilibrium at the start, before offsets and slope. None if the structure starts where its
     blueprint places it."""
@@ -74,30 +77,32 @@ class Structure(Blueprint):
 
     def turned(self, slope: float) -> Self:
         """A copy of the structure that stands on an incline as it did on flat ground. The incline
-        rises by the angle `slope` (rad) along x, falls if it is negative. All bodies are rotated
-        about the world's y axis through the origin."""
+        rises by the angle `slope` (rad) along x, falls if it is negative. All bodies and their
+        velocities are rotated about the world's y axis through the origin."""
         # Written out, because processors round a product of matrices differently.
         s, c = math.sin(slope), math.cos(slope)
-        forward, left, up = self.p_WB.T
-        p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
+
+        def turned(vectors: np.ndarray) -> np.ndarray:
+            forward, left, up = vectors.T
+            return np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
+
+        p_WB, v_WB = turned(self.p_WB), self.v_WB
+        if v_WB is not None:
+            v_WB = turned(v_WB.reshape(-1, 3)).reshape(-1, 6)
         s, c = math.sin(slope / 2), math.cos(slope / 2)
         w, x, y, z = self.q_WB.T
         q_WB = np.stack([c * w + s * y, c * x - s * z, c * y - s * w, c * z + s * x], axis=1)
-        return dataclasses.replace(self, p_WB=p_WB, q_WB=q_WB)
+        return dataclasses.replace(self, p_WB=p_WB, q_WB=q_WB, v_WB=v_WB)
 
     @functools.cached_property
     def cables(self) -> np.ndarray:
-        """Cables with their nodes, signals and constants: records (cables,) of dtype
-        laws.cable.CABLE. Their `signal` is the index of the oscillator that drives the cable, or
-        laws.cable.PASSIVE without actuator."""
-        cables = np.zeros(len(self.cable_names), dtype=cable.CABLE)
-        cables["node_a"], cables["node_b"] = self.cable_ends.T
-        cables["signal"] = cable.PASSIVE
+        """Cables with their nodes, signals and constants: records (cables,) of
+        laws.cable.cable_type(). Their `signal` is the index of the oscillator that drives the
+        cable, or laws.cable.PASSIVE without actuator."""
+        laws = [cable.CableLaw(**law) for law in self.cable_laws]
+        cables = cable.CableLaw.put(laws, *self.cable_ends.T)
         for oscillator, driven in enumerate(self.groups):
             cables["signal"][list(driven)] = oscillator
-        laws = [cable.CableLaw(**law) for law in self.cable_laws]
-        for name in cable.CableLaw._fields:
-            cables[name] = [getattr(law, name) for law in laws]
         return cables
 
     @functools.cached_property
@@ -200,9 +205,10 @@ class Structure(Blueprint):
 
     @property
     def initial_state(self) -> np.ndarray:
-        """State [q; v] (13*bodies,) at t = 0. Velocities are zero."""
+        """State [q; v] (13*bodies,) at t = 0."""
         poses = np.hstack([self.q_WB, self.p_WB]).ravel()
-        return np.concatenate([poses, np.zeros(6 * len(self.bodies))])
+        velocities = np.zeros(6 * len(self.bodies)) if self.v_WB is None else self.v_WB.ravel()
+        return np.concatenate([poses, velocities])
 
     @property
     def initial_lengths(self) -> np.ndarray:
@@ -240,13 +246,18 @@ def with_origins(states: np.ndarray, p_BC: np.ndarray) -> np.ndarray:
         return states
     bodies, xyz = np.arange(len(p_BC))[:, np.newaxis], np.arange(3)
     q, v = 7 * bodies, 7 * len(p_BC) + 6 * bodies
-    scalar, vector, moved = states[..., q], states[..., q + 1 + xyz], states.copy()
-    turn = 2.0 * np.cross(vector, p_BC)
-    turn /= scalar**2 + (vector**2).sum(axis=-1, keepdims=True)
-    p_BC_W = p_BC + scalar * turn + np.cross(vector, turn)
+    p_BC_W, moved = rotated(states[..., q + np.arange(4)], p_BC), states.copy()
     moved[..., q + 4 + xyz] += p_BC_W
     moved[..., v + 3 + xyz] += np.cross(states[..., v + xyz], p_BC_W)
     return moved
+
+
+def rotated(q: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Vectors p (..., 3) after rotations by quaternions q (..., 4), w first, of any length."""
+    scalar, vector = q[..., :1], q[..., 1:]
+    turn = 2.0 * np.cross(vector, p)
+    turn /= scalar**2 + (vector**2).sum(axis=-1, keepdims=True)
+    return np.asarray(p + scalar * turn + np.cross(vector, turn))
 
 
 def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:

@@ -7,14 +7,15 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.laws.model import WORLD, carriers_of
-from tetra_drake.settings.refusals import refuse
+from tetra_drake.scenario.start import Start
+from tetra_drake.settings.refusals import hint, refuse
 
 TOLERANCE = 1e-6
 """Distance below which two points count as the same, as a share of the robot's size."""
@@ -124,7 +125,7 @@ class Blueprint:
     cable_ends: np.ndarray
     """Indices of the two end nodes of each cable (cables, 2). The node of the body with the lower
     index comes first."""
-    cable_laws: tuple[Mapping[str, float], ...]
+    cable_laws: tuple[Mapping[str, Any], ...]
     """Constants of each cable's force law, by the names of laws.cable.CableLaw."""
     slack: bool
     """True if cables go slack instead of pushing."""
@@ -137,6 +138,9 @@ class Blueprint:
     cable_rings: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
     """Inner nodes of each cable that runs over rings, from its first end to its second, by the
     index of the cable. Such cables come after all straight ones."""
+    cable_limits: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """Greatest tensions (cables,) that the springs bear, infinite without a limit; empty if no
+    cable has one."""
     joints: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), dtype=int))
     """Indices of the two nodes of each ball joint (joints, 2), nodes of two bodies at one place.
     The node of the body with the lower index comes first."""
@@ -157,6 +161,8 @@ class Blueprint:
     """True if the bodies' x axes point forward, so that the robot has a heading."""
     feet: int | None = None
     """Number of nodes that bear the weight; None if it follows from the equilibrium."""
+    start: Start | None = None
+    """How the bodies are turned and move at t = 0."""
     settles: bool = True
     """True if the robot starts in equilibrium, False if it starts at the given positions."""
 
@@ -304,13 +310,17 @@ class Blueprint:
             refuse("contacts", "found none, expected one node at least")
 
     def check_sizes(self) -> None:
-        """Raises InputError if `offsets` or `payload` has not one item for each body, or if a strut
-        is too short, too long, too thin or too light for the computation of forces."""
+        """Raises InputError if `offsets` or `payload` has not one item for each body, if `start`
+        names no body, or if a strut is too short, too long, too thin or too light for the
+        computation of forces."""
         bodies = len(self.bodies)
         for key, items in (("offsets", self.offsets), ("payload", self.payload)):
             if len(items) != bodies:
                 expected = f"expected none or {bodies}, one for each body"
                 refuse(key, f"found {len(items)} items, {expected}")
+        for name in self.start.bodies if self.start else ():
+            if name not in self.bodies:
+                refuse(f"start.bodies.{name}", f"found no such body; {hint(name, self.bodies)}")
 
         lengths, diameters = self._distances(self.struts), 2.0 * self.strut_radius
         masses = math.pi * self.strut_radius**2 * lengths * self.strut_density

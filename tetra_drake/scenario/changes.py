@@ -13,7 +13,7 @@ from tetra_drake.settings.section import Tree, joined, mapped, parts_of, tree_va
 REPLACED = ("objective", "require", "evolve", "robot.actuated")
 """Keys of mappings that a file replaces as a whole, instead of merging them."""
 
-REMOVABLE = ("disturbances", "policy")
+REMOVABLE = ("disturbances", "policy", "robot.start")
 """Sections that an empty key removes, as in `disturbances:`."""
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from tetra_drake.scenario.events import Event
 from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.section import value_at
 
 IterationSeed = tuple[int, int, int]
 """Seed of an iteration's draws: seed of the run, number of the trial, number of the iteration."""
@@ -29,17 +30,19 @@ class Draw:
     moves: np.ndarray | None = None
     """Displacement of each body at t = 0 (n, 3), in m."""
     terrain_seed: int | None = None
+    sensing_seed: int | None = None
     events: tuple[Event, ...] = ()
     """Events in addition to the scenario's: cables that break."""
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
     """The draw (set of random changes) that a seed, a few integers, gives for the scenario's
-    `disturbances`. Without them it changes nothing. Its factors do not depend on the scenario's
-    numbers."""
+    `disturbances` and its `sensing`. Without them it changes nothing. Its factors do not depend on
+    the scenario's numbers."""
     settings = scenario.disturbances
+    sensing_seed = int(stream(seed, "sensing").integers(2**31)) if scenario.sensing else None
     if settings is None:
-        return Draw({})
+        return Draw({}, sensing_seed=sensing_seed)
     factors = {}
     for joined, spread in settings.spreads.items():
         factors[joined] = 1.0 + stream(seed, *separate(joined)).uniform(-spread, spread)
@@ -56,13 +59,14 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
         factors=factors,
         moves=reach * moves if reach else None,
         terrain_seed=terrain_seed if hasattr(scenario.terrain, "seed") else None,
+        sensing_seed=sensing_seed,
         events=events,
     )
 
 
 def stream(seed: Sequence[int], *names: str) -> np.random.Generator:
     """Random generator for the disturbance or the tolerance of the scenario keys `names`, or for
-    "start", "terrain" or "cuts". Its numbers do not depend on what else is random."""
+    "start", "terrain", "sensing" or "cuts". Its numbers do not depend on what else is random."""
     digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
     words = np.frombuffer(digest, dtype="<u4")
     return np.random.default_rng(np.random.SeedSequence(list(seed), spawn_key=words.tolist()))
@@ -73,16 +77,19 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
 
     The values are not checked: the largest changes were checked when the scenario was loaded.
     """
-    numbers = scenario.numbers()
+    tree = scenario.model_dump()
     factors = [(key, x) for joined, x in draw.factors.items() for key in separate(joined)]
-    changed = scenario.with_numbers({key: x * numbers[key] for key, x in factors})
+    changed = scenario.with_numbers({key: x * value_at(tree, key) for key, x in factors})
     robot, terrain = changed.robot, changed.terrain
     if draw.moves is not None:
         offsets = draw.moves + (robot.offsets or np.zeros_like(draw.moves))
         robot = robot.model_copy(update={"offsets": offsets.tolist()})
     if draw.terrain_seed is not None:
         terrain = terrain.model_copy(update={"seed": draw.terrain_seed})
-    events = [*scenario.events, *draw.events]
+    if draw.sensing_seed is not None and changed.sensing is not None:
+        sensing = changed.sensing.model_copy(update={"seed": draw.sensing_seed})
+        changed = changed.with_sections(sensing=sensing)
+    events = [*changed.events, *draw.events]
     return changed.with_sections(robot=robot, terrain=terrain, events=events, disturbances=None)
 
 

@@ -1,8 +1,9 @@
-"""Events during a simulation: cables that break, masses that fall off, a ground that changes."""
+"""Events during a simulation: cables that break, masses that fall off, pushes, other ground."""
 
 from __future__ import annotations
 
 import dataclasses
+import operator
 from collections.abc import Sequence
 from typing import TypeVar
 
@@ -11,6 +12,7 @@ from pydantic import Field
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.scenario.blueprint import Blueprint, cable_numbers
+from tetra_drake.scenario.start import Push
 from tetra_drake.settings.quantities import Keyed, Time
 from tetra_drake.settings.refusals import hint, refuse
 from tetra_drake.settings.section import Section
@@ -31,6 +33,8 @@ class Event(Section):
     row. The rest keeps its velocity."""
     change: Keyed[str, float | str] = Field(default={})
     """New numbers by scenario key, such as friction.static, of the ground and its friction."""
+    push: Push | None = Field(default=None, exclude_if=operator.not_)
+    """Impulse that acts at once."""
 
 
 def up_to_each(events: Sequence[Event]) -> list[list[Event]]:
@@ -58,7 +62,8 @@ def blueprint_after(blueprint: BlueprintT, events: Sequence[Event]) -> Blueprint
 
 def check_taken(events: Sequence[Event], blueprint: Blueprint) -> None:
     """Refuses names of cables and point masses that the robot does not have or that two events take
-    away, and the loss of all of a body's mass. Keys begin with "events"."""
+    away, the loss of all of a body's mass, and pushes on nothing or on what is held. Keys begin
+    with "events"."""
     cables = cable_numbers(blueprint.cable_names)
     masses = {name: number for number, name in enumerate(_point_masses(blueprint))}
     taken: dict[object, str] = {}
@@ -75,10 +80,24 @@ def check_taken(events: Sequence[Event], blueprint: Blueprint) -> None:
             earlier = taken.setdefault((known is cables, known[name]), key)
             if earlier != key:
                 refuse(key, f"found '{name}', which {earlier} takes away; expected it once")
+        if event.push:
+            _check_push(f"{place}.push", event.push, blueprint)
         try:
             blueprint_after(blueprint, events[: i + 1]).check_masses()
         except InputError as error:
             refuse(f"{place}.lose", f"{error.key} {error.problem}")
+
+
+def _check_push(key: str, push: Push, blueprint: Blueprint) -> None:
+    nodes, bodies = blueprint.node_names, blueprint.bodies
+    if push.on not in (*bodies, *nodes):
+        advice = hint(push.on, [*bodies, *nodes])
+        refuse(f"{key}.on", f"found '{push.on}', no node or body; {advice}")
+    held = blueprint.held[nodes.index(push.on)] if push.on in nodes else (False,) * 3
+    for axis, is_held, impulse in zip("xyz", held, push.impulse, strict=True):
+        if is_held and impulse:
+            found = f"found {impulse:g} N*s along {axis}, along which {push.on} is held"
+            refuse(f"{key}.impulse", f"{found}; expected 0")
 
 
 def _point_masses(blueprint: Blueprint) -> list[str]:

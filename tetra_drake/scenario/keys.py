@@ -120,7 +120,7 @@ def _value(node: Tree) -> str:
     if "anyOf" in node:
         return " or ".join(_value(part) for part in node["anyOf"] if part != {"type": "null"})
     if "properties" in node:
-        return "by metric"
+        return "by reading" if "rates" in node["properties"] else "by metric"
     if "$ref" in node:
         return "mapping"
     if "additionalProperties" in node:

@@ -17,8 +17,8 @@ ROW = "row of tetrahedra"
 class RobotSettings(Section):
     """Base class for the settings of a robot.
 
-    All kinds have the settings `gravity`, `offsets` (one for each body) and `tolerances`, and
-    `unit`, which is the unit of bare coordinates in a file, or None.
+    All kinds have the settings `gravity`, `offsets` (one for each body), `start` and `tolerances`,
+    and `unit`, which is the unit of bare coordinates in a file, or None.
     """
 
     lacking: ClassVar[tuple[str, ...]] = (ROW,)
@@ -26,6 +26,7 @@ class RobotSettings(Section):
     if TYPE_CHECKING:  # fields of the kinds, each at its place in a file
         gravity: Any
         offsets: Any
+        start: Any
         tolerances: Any
 
         @property

@@ -20,10 +20,16 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_stretch
+from tetra_drake.laws.cable import (
+    CableLaw,
+    Curve,
+    elastic_stretch,
+    elastic_tension,
+)
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
+from tetra_drake.scenario.start import Start
 from tetra_drake.scenario.structure_graph import (
     Member,
     Pair,
@@ -36,6 +42,7 @@ from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.quantities import (
     Acceleration,
+    Damping,
     Density,
     ForceQuantity,
     InertiaQuantity,
@@ -45,6 +52,7 @@ from tetra_drake.settings.quantities import (
     Position,
     Stiffness,
     Time,
+    quantity,
 )
 from tetra_drake.settings.refusals import described, hint, refuse
 from tetra_drake.settings.section import (
@@ -64,6 +72,10 @@ about this share."""
 
 ROUNDED = 1e-12
 """Relative error of the moments of a flat body that counts as a rounding error."""
+
+
+STRING_TIME = 1e-3
+"""Ratio (s) of damping to stiffness of strings, as of anchors and joints."""
 
 
 def _check_name(name: object) -> object:
@@ -129,14 +141,54 @@ class SphereGroup(Section):
     that anchors hold along z."""
 
 
-class CableGroup(CableConstants):
-    """Cables with the same constants. They never push."""
+class CurveTable(Section):
+    """Measured elastic tension of a spring: straight between its points, from 0 N without stretch,
+    and on with the last slope."""
 
+    stretch: list[Annotated[Length, Field(gt=0)]] = Field(min_length=1, max_length=50)
+    """Stretches of the points, ascending."""
+    force: list[Annotated[ForceQuantity, Field(gt=0)]] = Field(min_length=1, max_length=50)
+    """Tension at each stretch, without the initial tension; ascending."""
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> CurveTable:
+        if len(self.force) != len(self.stretch):
+            refuse("force", f"found {len(self.force)} items, expected {len(self.stretch)}")
+        for name in ("stretch", "force"):
+            if any(after <= before for before, after in itertools.pairwise(getattr(self, name))):
+                refuse(name, f"found {getattr(self, name)}, expected ascending numbers")
+        return self
+
+
+class CableGroup(Section):
+    """Cables, springs or strings with the same constants. They never push."""
+
+    damping: Damping | None = Field(default=None, ge=0)
+    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
+    default is 1 ms times its stiffness."""
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
     """The nodes that each cable joins. A cable such as [a, b, c] runs over frictionless rings at
     its inner nodes, with one tension."""
-    stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
-    """Tension per elongation."""
+    stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
+    """Tension per elongation. Only a string or a curve needs none."""
+    string: bool = Field(default=False, exclude_if=operator.not_)
+    """True for strings, which hardly stretch. Without a stiffness they get the default of
+    `anchor_stiffness`."""
+    initial_tension: ForceQuantity = Field(default=0.0, ge=0, exclude_if=operator.not_)
+    """Tension F0 of a coil spring from which on its coils part: T = F0 + k x. Below it, they are
+    1000 times as stiff."""
+    quadratic: Annotated[float, *quantity("N/m^2")] = Field(
+        default=0.0, ge=0, exclude_if=operator.not_
+    )
+    """Coefficient a of a spring that hardens, T = F0 + k x + a x² + b x³."""
+    cubic: Annotated[float, *quantity("N/m^3")] = Field(default=0.0, ge=0, exclude_if=operator.not_)
+    """Coefficient b; see `quadratic`."""
+    curve: CurveTable | None = Field(default=None, exclude_if=operator.not_)
+    """Table of stretch and tension, in place of a stiffness."""
+    max_tension: ForceQuantity | None = Field(default=None, gt=0, exclude_if=operator.not_)
+    """Greatest tension that a cable bears. A larger one is told."""
+    max_stretch: Length | None = Field(default=None, gt=0, exclude_if=operator.not_)
+    """Greatest stretch of a cable's spring. A tension above its tension there is told."""
     free_length: Length | None = Field(default=None, ge=0)
     """Length without tension. A group has a free length or a tension."""
     tension: ForceQuantity | None = Field(default=None, ge=0)
@@ -153,25 +205,42 @@ class CableGroup(CableConstants):
         if (self.free_length is None) == (self.tension is None):
             found = "neither" if self.tension is None else "both"
             refuse("free_length", f"found {found}, expected one of free_length and tension")
+        if self.curve and (self.stiffness or self.quadratic or self.cubic or self.string):
+            refuse("curve", "found another law beside it, expected the curve alone")
+        if self.string and (self.initial_tension or self.quadratic or self.cubic):
+            refuse("string", "found a law of a spring beside it, expected stiffness at most")
+        needed = {"stiffness": not (self.curve or self.string), "damping": not self.string}
+        needed |= {"free_length": self.string and self.stiffness is None}
+        for key, is_needed in needed.items():
+            if is_needed and getattr(self, key) is None:
+                refuse(key, "is missing; give it")
         for name, factors in self.factors.items():
             if len(factors) != len(self.pairs) or getattr(self, name) is None:
                 found = f"found {len(factors)} factors of {name}"
                 refuse(f"factors.{name}", f"{found}, expected {len(self.pairs)} of a given number")
         return self
 
-    def law(self, distance: float, place: int) -> dict[str, float]:
+    def law(self, distance: float, place: int, *, firm: float = 0.0) -> dict[str, Any]:
         """Constants (SI) of a cable's force law, by the names of laws.cable.CableLaw. `distance`
         (m) is the distance of its nodes in the file; it gives the free length for a `tension`.
-        `place` is the cable's index in `pairs`."""
+        `place` is the cable's index in `pairs`, `firm` (N/m) the stiffness of strings that give
+        none."""
         own: dict[str, float] = {
             name: values[place] * getattr(self, name) for name, values in self.factors.items()
         }
         group = self.model_copy(update=own) if own else self
-        free_length = group.free_length
+        stiffness, damping, free_length = group.stiffness or firm, group.damping, group.free_length
+        table = [*zip(self.curve.stretch, self.curve.force, strict=True)] if self.curve else []
+        if table:
+            stiffness = table[-1][1] / table[-1][0]
+        more = {name: getattr(self, name) for name in ("initial_tension", "quadratic", "cubic")}
+        curve = Curve.of_spring(stiffness, table=table, **more)
+        law: dict[str, Any] = {"damping": STRING_TIME * stiffness if damping is None else damping}
+        law |= {"stiffness": stiffness} | ({"curve": curve} if curve.pieces else {})
         if free_length is None:
-            law = CableLaw(**group.constants(stiffness=group.stiffness, free_length=distance))
-            free_length = distance - elastic_stretch(group.tension or 0.0, law)
-        return group.constants(stiffness=group.stiffness, free_length=free_length)
+            own_law = CableLaw(**law, free_length=distance)
+            free_length = distance - elastic_stretch(group.tension or 0.0, own_law)
+        return law | {"free_length": free_length}
 
 
 class BallJoint(Section):
@@ -277,6 +346,8 @@ class StructureFile(RobotSettings):
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
     its anchors."""
+    start: Start | None = Field(default=None, exclude_if=operator.not_)
+    """How the robot is turned and moves at t = 0; at rest if there is none."""
     ignored: list[str] | None = None
     """Settings of an imported file that have no effect, such as friction; noted when the file is
     read."""
@@ -325,6 +396,7 @@ class StructureFile(RobotSettings):
             anchor_damping=self.anchor_time_constant * held,
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
+            start=self.start,
             **cables,
             **self._joints_of(number, body_of),
             given_inertia={
@@ -338,23 +410,27 @@ class StructureFile(RobotSettings):
                 for names in self.actuated.values()
             ),
         )
-        if not (self.joints or held.any()):
+        is_firm = any(group.string and not group.stiffness for group in self.cables.values())
+        if not (self.joints or held.any() or is_firm):
             return blueprint
         firm = min(blueprint.firm_stiffness(self.gravity))
         anchors, of_joints = self.anchor_stiffness or firm, self.joint_stiffness or firm
         joints = np.array([joint.stiffness or of_joints for joint in self.joints.values()])
         return dataclasses.replace(
             blueprint,
+            **self._cables_of(number, body_of, firm=firm),
             anchor_stiffness=anchors * blueprint.anchor_stiffness,
             anchor_damping=anchors * blueprint.anchor_damping,
             joint_stiffness=joints,
             joint_damping=joints * blueprint.joint_damping,
         )
 
-    def _cables_of(self, number: Mapping[str, int], body_of: Mapping[str, int]) -> dict[str, Any]:
+    def _cables_of(
+        self, number: Mapping[str, int], body_of: Mapping[str, int], *, firm: float = 0.0
+    ) -> dict[str, Any]:
         """Fields of the blueprint for the cables, each from the body with the lower index. Cables
         within a body of `bodies` are left out. `number` and `body_of` have the index of each node
-        and of its body."""
+        and of its body. `firm` (N/m) is the stiffness of strings that give none."""
         rigid = [{body_of[nodes[0]]} for nodes in self._nodes_of_joined().values()]
         found: list[tuple[bool, list[int], Member]] = []
         for cable in members("cables", self.cables):
@@ -362,14 +438,18 @@ class StructureFile(RobotSettings):
             if {*bodies} not in rigid:
                 found.append((len(bodies) > 2, sorted([bodies[0], bodies[-1]]), cable))
         cables = [cable for *_, cable in sorted(found, key=lambda one: one[:2])]
-        laws, paths = [], []
+        laws, paths, limits = [], [], []
         for cable in cables:
             is_backward = body_of[cable.nodes[0]] > body_of[cable.nodes[-1]]
             path = cable.nodes[::-1] if is_backward else cable.nodes
             places = [self.nodes[node] for node in path]
             length = sum(itertools.starmap(math.dist, itertools.pairwise(places)))
-            place_in_group = parts_of(cable.key)[-1]
-            laws.append(self.cables[cable.group].law(length, int(place_in_group)))
+            group, place_in_group = self.cables[cable.group], parts_of(cable.key)[-1]
+            laws.append(group.law(length, int(place_in_group), firm=firm))
+            limits.append(group.max_tension or math.inf)
+            if group.max_stretch:
+                most = elastic_tension(group.max_stretch, CableLaw(**laws[-1]))
+                limits[-1] = min(limits[-1], most)
             paths.append([number[node] for node in path])
         ends = [[path[0], path[-1]] for path in paths]
         return {
@@ -378,6 +458,7 @@ class StructureFile(RobotSettings):
             "cable_keys": tuple(cable.key for cable in cables),
             "cable_ends": np.array(ends, dtype=int).reshape(-1, 2),
             "cable_laws": tuple(laws),
+            "cable_limits": np.array(limits),
             "cable_rings": {i: tuple(path[1:-1]) for i, path in enumerate(paths) if len(path) > 2},
         }
 
@@ -619,11 +700,13 @@ class ParametricRobot(RobotSettings):
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty."""
+    start: Start | None = Field(default=None, exclude_if=operator.not_)
+    """How the robot is turned and moves at t = 0; at rest if there is none."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
     """Tolerances of numbers of the robot by key."""
 
     def structure(self) -> StructureFile:
-        """The structure for these settings. Its gravity, offsets and tolerances are not used."""
+        """The structure for these settings. Its gravity and tolerances are not used."""
         raise NotImplementedError
 
     def blueprint(self) -> Blueprint:
@@ -632,7 +715,8 @@ class ParametricRobot(RobotSettings):
         if not isinstance(structure, StructureFile):
             refuse("", f"{origin(self)}: structure() gave {structure!r:.40}, expected a Structure")
         made = structure.blueprint()
-        return dataclasses.replace(made, offsets=np.array(self.offsets or made.offsets))
+        moved = np.array(self.offsets or made.offsets)
+        return dataclasses.replace(made, offsets=moved, start=self.start or made.start)
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Self:

@@ -10,12 +10,14 @@ from typing import Annotated, ClassVar, Literal, get_args
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_tension
+from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.robot_settings import RobotSettings
+from tetra_drake.scenario.start import Start
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.quantities import (
     Acceleration,
+    Damping,
     Density,
     Length,
     Mass,
@@ -58,8 +60,11 @@ def tetrahedron_nodes(strut_length: float) -> np.ndarray:
     return np.array([*base, [3 * height / 4, 0.0, 0.0]])
 
 
-class RowCables(CableConstants):
+class RowCables(Section):
     """The cables of a row of tetrahedra (Table 3 of the thesis)."""
+
+    damping: Damping = Field(ge=0)
+    """Damping coefficient of a cable: tension divided by the rate of its length."""
 
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of outer cables, which join base nodes of the same name."""
@@ -74,7 +79,8 @@ class RowCables(CableConstants):
         """Constants (SI) of the force law of one cable of a junction, such as "outer top", by the
         names of laws.cable.CableLaw."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
-        return self.constants(stiffness=stiffness, free_length=self.free_length)
+        own = {"damping": self.damping, "free_length": self.free_length}
+        return own | {"stiffness": stiffness}
 
 
 Spacing = Annotated[float, *quantity("m", balanced=0.0)]
@@ -105,6 +111,8 @@ class Tetrahedra(RobotSettings):
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
+    start: Start | None = Field(default=None, exclude_if=operator.not_)
+    """How the robot is turned and moves at t = 0; at rest if there is none."""
     payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
     """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
@@ -167,6 +175,7 @@ class Tetrahedra(RobotSettings):
             anchor_damping=np.zeros((4 * n, 3)),
             payload=np.array(self.payload or [0.0] * n),
             offsets=np.array(self.offsets or np.zeros((n, 3))),
+            start=self.start,
             cable_names=tuple(f"{name} {cable}" for name in names for cable in CABLES),
             cable_groups=tuple(cable.split()[0] for cable in CABLES) * junctions,
             cable_keys=("cables",) * (len(CABLES) * junctions),

@@ -240,14 +240,17 @@ class Scenario(World):
             whole = len(self.whole_cables)
             if cuts.count > whole:
                 refuse("disturbances.cuts.count", f"found {cuts.count}, expected at most {whole}")
-        undisturbed, numbers = self.with_sections(disturbances=None, evolve={}), self.numbers()
+        undisturbed = self.with_sections(disturbances=None, evolve={})
+        tree = self.model_dump(exclude={"disturbances", "objective", "require"})
         for joined, spread in self.disturbances.spreads.items():
             place, keys = f"disturbances.spreads.{joined}", separate(joined)
-            for key in keys:
-                if key not in numbers:
-                    refuse(place, f"'{key}' is no number of the scenario; {hint(key, numbers)}")
+            numbers = {key: value_at(tree, key) for key in keys}
+            for key, number in numbers.items():
+                if not isinstance(number, float):
+                    advice = hint(key, self.numbers())
+                    refuse(place, f"'{key}' is no number of the scenario; {advice}")
             for factor in (1.0 - spread, 1.0 + spread):
-                changed = undisturbed.with_numbers({key: factor * numbers[key] for key in keys})
+                changed = undisturbed.with_numbers({key: factor * x for key, x in numbers.items()})
                 try:
                     self.from_tree(changed.model_dump(), place)
                 except InputError as error:

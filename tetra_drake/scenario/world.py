@@ -22,9 +22,10 @@ from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoc
 from tetra_drake.scenario.events import Event, check_taken, up_to_each
 from tetra_drake.scenario.policies import Policy
 from tetra_drake.scenario.robot_settings import RobotKind
+from tetra_drake.scenario.sensing import Sensing
 from tetra_drake.scenario.simulation import SimulationSection
 from tetra_drake.settings.refusals import TAG, hint, refuse
-from tetra_drake.settings.section import Kinds, Section, Tree, flattened
+from tetra_drake.settings.section import Kinds, Section, Tree, flattened, parts_of
 from tetra_drake.settings.units import SYSTEMS, Units, current, fitting
 
 EngineT = TypeVar("EngineT", Drake, Compiled, Mujoco)
@@ -66,10 +67,13 @@ class World(Section):
     policy: Policy | None = Field(default=None, exclude_if=lambda policy: policy is None)
     """A closed loop in place of the oscillator network; evolution searches its parameters. An empty
     key removes the base's."""
+    sensing: Sensing | None = Field(default=None, exclude_if=lambda sensing: sensing is None)
+    """Errors and delays with which policies and controllers see the robot. An empty key removes the
+    base's."""
     simulation: SimulationSection
     engine: EngineKind = Drake()
     events: list[Event] = Field(default=[], exclude_if=operator.not_)
-    """Changes of robot or ground during the simulation, such as a cable that breaks."""
+    """Changes of robot or ground during the simulation, such as a cable that breaks; pushes."""
 
     def values(self) -> dict[str, Any]:
         """Values by dotted keys, without the scenario's name. Scenarios with the same values are
@@ -178,7 +182,7 @@ class World(Section):
         They are not checked."""
         changed = self
         for key, number in numbers.items():
-            changed = _with_number(changed, key.split("."), number)
+            changed = _with_number(changed, parts_of(key), number)
         return changed
 
     def numbers(self) -> dict[str, float]:
@@ -232,8 +236,8 @@ class World(Section):
         for i, events in zip(order, up_to_each(self.events), strict=True):
             place, event = f"events[{i}]", self.events[i]
             self._check_time(f"{place}.at", event.at)
-            if not (event.cut or event.lose or event.change):
-                refuse(place, "changes nothing, expected cut, lose or change")
+            if not (event.cut or event.lose or event.change or event.push):
+                refuse(place, "changes nothing, expected cut, lose, change or push")
             for key in event.change:
                 if key not in changeable:
                     found = f"'{key}' is no number of ground or friction"
@@ -251,12 +255,14 @@ class World(Section):
             refuse(key, f"found {time:g} s, expected less than the duration, {end:g} s")
 
 
-def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
-    """A copy of a section or mapping with another number at the path `names`: the parts of a dotted
-    key, such as ["ground", "stiffness"]."""
+def _with_number(value: Any, names: Sequence[Any], number: float) -> Any:
+    """A copy of a section, mapping or list with another number at the path `names`: the parts of a
+    dotted key, such as ["ground", "stiffness"]."""
     if not names:
         return number
     name, *rest = names
     if isinstance(value, Section):
         return value.model_copy(update={name: _with_number(getattr(value, name), rest, number)})
+    if isinstance(value, list):
+        return [*value[:name], _with_number(value[name], rest, number), *value[name + 1 :]]
     return {**value, name: _with_number(value[name], rest, number)}

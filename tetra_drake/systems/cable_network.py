@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -71,7 +72,8 @@ class CableNetwork(ConvertibleSystem):
     has no direction: the outputs raise SimulationFailure.
 
     With `parameters`, the constants of the cables are parameters of the context (4*cables,): each
-    field of laws.cable.CableLaw for all cables, one field after the other; see SetLaw().
+    number of laws.cable.CableLaw for all cables, one after the other, then the rows of their
+    curves, if any; see SetLaw().
     """
 
     def __init__(
@@ -81,11 +83,15 @@ class CableNetwork(ConvertibleSystem):
         and the bodies. `names` are the cables' names, for errors. `signals` is the number m of
         signals, not the signals themselves."""
         super().__init__()
-        self._names = names
-        self._constants = np.concatenate(model.cables.law)  # a copy, which a context may replace
-        law = _law_of(self._constants)
+        self._names, own = names, model.cables.law
+        self._curve = own.curve
+        # A copy, which a context may replace.
+        self._constants = np.concatenate([*own[:-1], own.curve.rows.ravel()])
+        law = _law_of(self._constants, self._curve)
         model = model._replace(cables=model.cables._replace(law=law))
-        self._has_parameters = parameters
+        self._has_parameters, self._law = parameters, law
+        self.warns = False
+        """True if a force that pulls a slack cable is to be told."""
         if parameters:
             self.DeclareNumericParameter(BasicVector(self._constants))
         bodies, count = model.bodies.mass.size, model.cables.signal.size
@@ -123,20 +129,25 @@ class CableNetwork(ConvertibleSystem):
         """Constants of the cables in a context of this system: a CableLaw of arrays (cables,), in
         the order of the cables. Raises InputError if they are no parameters."""
         check_parameters("GetLaw", self, context)
-        return _law_of(context.get_numeric_parameter(0).CopyToVector())
+        return _law_of(context.get_numeric_parameter(0).CopyToVector(), self._curve)
 
     def SetLaw(self, context: Context, law: cable.CableLaw) -> None:
         """Replaces the constants of the cables in a context of this system.
 
-        The states of actuators stay. Each field of `law` is an array (cables,), or one number for
-        all cables. Raises InputError if the constants are no parameters, or one of them is negative
-        or not finite.
+        The states of actuators stay. Each number of `law` is an array (cables,), or one number for
+        all cables; its curves are like the present ones, or the present ones stay. Raises
+        InputError if the constants are no parameters, or one of them is negative or not finite.
         """
         check_parameters("SetLaw", self, context)
         check_type("SetLaw", "law", law, cable.CableLaw)
-        given, count = law._asdict().items(), len(self._names)
-        rows = [numbers_for_each("SetLaw", key, row, count=count, least=0.0) for key, row in given]
-        context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(rows))
+        count, own = len(self._names), self.GetLaw(context).curve
+        curve = np.ravel(law.curve.rows if law.curve.pieces else own.rows)
+        numbers = [
+            numbers_for_each("SetLaw", key, getattr(law, key), count=count, least=0.0)
+            for key in cable.NUMBERS
+        ]
+        numbers.append(numbers_for_each("SetLaw", "curve", curve, count=own.rows.size))
+        context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(numbers))
 
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
@@ -156,11 +167,22 @@ class CableNetwork(ConvertibleSystem):
             signals = self._signals.Eval(context)
         state, table = self._state.Eval(context), self._forces.cable_forces
         total = self._compute_forces(self._parts, state, signals, force)
+        if self.warns and not moves_only:
+            self._warn(table)
         if math.isfinite(total) or not np.isfinite(state).all():
             return table
         place = int(np.argmin(np.isfinite(table).all(axis=1)))
         reason = f"the ends of cable '{self._names[place]}' meet, or its forces are too large"
         raise SimulationFailure(time=context.get_time(), reason=reason)
+
+    def _warn(self, table: np.ndarray) -> None:
+        """Warns, once, of a signal that pulls a slack cable."""
+        is_slack = table[:, cable.LENGTH] < self._law.free_length
+        pulled = np.where(is_slack, table[:, cable.TENSION], 0.0)
+        if pulled.any():
+            most, self.warns = int(pulled.argmax()), False
+            told = f"'{self._names[most]}' is slack, and its signal pulls with {pulled[most]:.3g} N"
+            warnings.warn(f"{told}; see actuation of AddCables", RuntimeWarning, stacklevel=2)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._table(context, output.get_mutable_value())
@@ -174,11 +196,12 @@ class CableNetwork(ConvertibleSystem):
         return self._forces.drives[:, actuator.RATE]
 
 
-def _law_of(constants: np.ndarray) -> cable.CableLaw:
+def _law_of(constants: np.ndarray, curve: cable.Curve) -> cable.CableLaw:
     """The parameters of a CableNetwork as a CableLaw of arrays (cables,), which share their
-    memory."""
-    rows: Any = np.split(constants, len(cable.CableLaw._fields))
-    return cable.CableLaw(*rows)
+    memory, with a curve like `curve`."""
+    numbers, rows = np.split(constants, [constants.size - curve.rows.size])
+    fields = np.split(numbers, len(cable.NUMBERS))
+    return cable.CableLaw._make([*fields, curve._replace(rows=rows.reshape(-1, 5))])
 
 
 @dataclass(frozen=True)
@@ -211,6 +234,7 @@ def AddCables(
     slack: bool = True,
     scene_graph: SceneGraph | None = None,
     parameters: bool = False,
+    warns: bool = True,
     name: str = "cables",
 ) -> CableNetwork:
     """Adds cables between bodies of a plant, or from a body to the world.
@@ -224,14 +248,18 @@ def AddCables(
         cables: the cables: names, ends and constants.
         actuated: for each signal, in the order of the signals, the names of the cables that it
             drives. The keys name the signals, in errors only. By default all cables are passive.
-        actuation: kind of the actuators, Force() by default. Kinds with states are added as the
-            system NAME_actuators, which is Drake's Integrator of `drive_rates`.
+        actuation: kind of the actuators. Force(), the default, adds the signal to the tension, also
+            of a slack cable: for cables that stay taut. Winch() winds and pays out, as if signals
+            were lengths: for cables that are shortened. TensionMotor() is for commanded tensions.
+            Kinds with states are added as the system NAME_actuators, which is Drake's Integrator of
+            `drive_rates`.
         drives: states of the actuators at t = 0, in the order of the cables. By default those
             that fit signals of 0 at the plant's default positions.
         slack: False if cables also push.
         scene_graph: where to show the cables.
         parameters: True if the constants of the cables are parameters of the context, which
             CableNetwork.SetLaw() replaces. The forces then take a few microseconds more.
+        warns: True for a RuntimeWarning when a Force first pulls a slack cable.
         name: name of the system.
 
     Raises:
@@ -247,6 +275,7 @@ def AddCables(
     check_type("AddCables", "actuation", actuation, ActuatorKind)
     check_type("AddCables", "slack", slack, bool)
     check_type("AddCables", "parameters", parameters, bool)
+    check_type("AddCables", "warns", warns, bool)
     pieces = _default_lengths(plant, cables)
     lengths = np.array([sum(of_pieces) for of_pieces in pieces])
     nodes = Nodes.of(plant, (frame for one in cables for frame in one.path))
@@ -273,6 +302,7 @@ def AddCables(
     }
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, **laws)
     network = CableNetwork(model, names=names, signals=len(actuated), parameters=parameters)
+    network.warns = warns and slack and not len(starts) and driven.size > 0
     builder.AddNamedSystem(name, network)
     Attach(builder, plant, network)
     if len(starts):
@@ -306,7 +336,8 @@ def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
         if any(one.name == earlier.name for earlier in cables[:place]):
             raise InputError("AddCables", key, "is given twice")
         check_type("AddCables", f"{key}.law", one.law, cable.CableLaw)
-        check_constants("AddCables", key, one.law._asdict())
+        check_constants("AddCables", key, dict(zip(cable.NUMBERS, one.law, strict=False)))
+        check_type("AddCables", f"{key}.law.curve", one.law.curve, cable.Curve)
         for end in ("frame_a", "frame_b"):
             check_frame("AddCables", f"{key}.{end}", plant, getattr(one, end))
         check_type("AddCables", f"{key}.rings", one.rings, tuple, list)
@@ -317,19 +348,16 @@ def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
 def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
-    """Records (cables,) of dtype laws.cable.CABLE: nodes, signal and constants of each cable.
+    """Records (cables,) of laws.cable.cable_type(): nodes, signal and constants of each cable.
 
     `actuated` has the names of the cables that each signal drives; see AddCables().
 
     Raises InputError if `actuated` has an unknown cable, or a cable twice.
     """
     places = {one.name: place for place, one in enumerate(cables)}
-    table = np.zeros(len(cables), dtype=cable.CABLE)
-    table["node_a"] = [nodes.of_frame[one.frame_a.index()] for one in cables]
-    table["node_b"] = [nodes.of_frame[one.frame_b.index()] for one in cables]
-    table["signal"] = cable.PASSIVE
-    for constant in cable.CableLaw._fields:
-        table[constant] = [getattr(one.law, constant) for one in cables]
+    node_a = [nodes.of_frame[one.frame_a.index()] for one in cables]
+    node_b = [nodes.of_frame[one.frame_b.index()] for one in cables]
+    table = cable.CableLaw.put([one.law for one in cables], node_a, node_b)
     for signal, (group, driven) in enumerate(actuated.items()):
         key = f"actuated.{group}"
         check_type("AddCables", key, driven, list, tuple)

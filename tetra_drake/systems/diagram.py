@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from types import NoneType
 
@@ -11,7 +12,14 @@ from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.lcm import DrakeLcmParams
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import Frame
-from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    InputPort,
+    OutputPort,
+    System,
+)
 from pydrake.systems.lcm import ApplyLcmBusConfig
 from pydrake.systems.primitives import ConstantVectorSource, PassThrough, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
@@ -50,6 +58,8 @@ def MakeTensegrityDiagram(
     modes: npt.ArrayLike | None = None,
 ) -> Diagram:
     """Diagram of a robot that walks with a gait. Its default context is at the start of the walk.
+    Drake's own Simulator(diagram) and larger diagrams lack the velocities of the start: see
+    MakeSimulator() and SetStart().
 
     The robot may also be driven by a controller, or by signals from outside: without `gait` and
     `controller`, the diagram has an input port `signals`.
@@ -151,6 +161,7 @@ def MakeTensegrityDiagram(
         slack=structure.slack,
         scene_graph=scene,
         parameters=parameters,
+        warns=False,
     )
     if ground is None:
         ground = AddGroundContact(
@@ -196,7 +207,20 @@ def MakeTensegrityDiagram(
         builder.ExportOutput(scene.get_query_output_port(), "query_object")
     diagram = builder.Build()
     diagram.set_name("tensegrity_robot")
+    if structure.v_WB is not None:
+        own = weakref.ref(diagram)
+        diagram.CreateDefaultContext = lambda: SetStart(
+            own(), Diagram.CreateDefaultContext(own()), robot
+        )
     return diagram
+
+
+def SetStart(diagram: Diagram, context: Context, robot: Robot) -> Context:
+    """Sets the velocities of a robot's start in a context of its diagram, and returns it."""
+    plant = diagram.GetSubsystemByName("plant")
+    velocities = robot.structure.initial_state[plant.num_positions() :]
+    plant.SetVelocities(plant.GetMyMutableContextFromRoot(context), velocities)
+    return context
 
 
 def _AddPlant(

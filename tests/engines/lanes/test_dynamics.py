@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.anchored import scenario_of
+from helpers.anchored import TREES, scenario_of
 from helpers.kernels import Stepper
 from helpers.states import disturbed, mass_matrix
 
@@ -20,7 +20,6 @@ from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
@@ -84,39 +83,9 @@ UNEVEN = Rough(amplitude=0.0005, wavelength=0.03, seed=1)
 """Ground that slopes by some degrees under the robot, of which some nodes touch it."""
 
 
-HELD = {"top": [0.3, 0.0, 0.4], "side": [-0.3, 0.1, 0.1]}
-"""Places of fixed nodes beside a prism."""
-
-
-def held_robot() -> tuple[Model, np.ndarray, np.ndarray]:
-    """A prism with anchors, and with cables from fixed nodes and over fixed rings. Its state is at
-    rest and slightly displaced; it has no contact modes."""
-    tree = read_structure("prism").model_dump()
-    rope = {"pairs": [["top", "n3"], ["side", "n1"], ["side", "n4"]], "stiffness": 10.0}
-    tree["cables"]["rope"] = rope | {"damping": 0.7, "free_length": 0.1}
-    over_rings = {"pairs": [["top", "n3", "side", "n4"], ["n0", "top", "n1"]], "damping": 0.9}
-    tree["cables"]["sling"] = tree["cables"]["rope"] | over_rings
-    tree["nodes"] |= HELD
-    anchors = dict.fromkeys(HELD, "xyz") | {"n0": "xyz", "n2": "yz", "n5": "x"}
-    robot = Robot.of(scenario_of(tree | {"anchors": anchors}))
-    state = disturbed(robot.structure, 0, pose=1e-3, speed=0.0)
-    return robot.model, state, np.zeros((0, MODE_COLUMNS))
-
-
-def star_robot() -> tuple[Model, np.ndarray, np.ndarray]:
-    """A bar that cables hold between four bodies, its state, and no contact modes. It is the first
-    body, and eliminated last."""
-    tree = read_structure("prism").model_dump()
-    bar = tree["struts"]["bar"]
-    cable = tree["cables"]["side"] | {"damping": 0.7, "free_length": 0.05}
-    left, right, ends = (["n1", "n5"], ["n2", "n3"], ["n0", "n4"])
-    tree["struts"] = {"bar": bar | {"pairs": [ends, left, right]}}
-    pairs = [[end, other] for end in ends for other in (*left, *right, "up", "far")]
-    tree["cables"] = {"star": cable | {"pairs": pairs}}
-    tree["nodes"] |= {"up": [0.0, 0.01, 0.3], "far": [0.3, 0.0, 0.1]}
-    changes = {"masses": {"up": 0.1, "far": 0.2}, "anchors": {"n0": "xyz"}, "actuated": {}}
-    robot = Robot.of(scenario_of(tree | changes | {"gravity": 0.0}))
-    assert Solver.of(robot.model).schedule.order[0] != 0
+def held_robot(name: str) -> tuple[Model, np.ndarray, np.ndarray]:
+    """A structure without ground, its state slightly displaced, and no contact modes."""
+    robot = Robot.of(scenario_of(TREES[name]))
     state = disturbed(robot.structure, 0, pose=1e-3, speed=0.0)
     return robot.model, state, np.zeros((0, MODE_COLUMNS))
 
@@ -136,7 +105,8 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(name, terrain, fric
     # friction would depend on the velocity by the normal force, too.) Gyroscopic torques are left
     # out of the matrix; at these small velocities they hardly count.
     if name in ("held", "star"):
-        robot, state, modes = held_robot() if name == "held" else star_robot()
+        robot, state, modes = held_robot(name)
+        assert (Solver.of(robot).schedule.order[0] == 0) == (name == "held")
     else:
         scenario = load_scenario(name).with_changes({"terrain": terrain, "friction": friction})
         if name == "six_bar":
@@ -179,7 +149,7 @@ def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
 
 
 def test_the_implicit_matrix_has_the_stiffness_of_anchors():
-    robot, state, modes = held_robot()
+    robot, state, modes = held_robot("held")
     damping, stiffness = damping_and_stiffness(robot, state, modes)
     # The damping of an anchor is 1 ms times its stiffness; ropes have damping alone.
     anchors = robot.anchors._replace(stiffness=0.0 * robot.anchors.stiffness)

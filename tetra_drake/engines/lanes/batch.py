@@ -36,7 +36,6 @@ from tetra_drake.robot.command import policy_signals
 from tetra_drake.robot.readings import Readings, bodies_state
 from tetra_drake.robot.robot import Phase
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
-from tetra_drake.robot.structure import with_origins
 
 FIRST = SurfaceGrid._fields.index("first")
 """Column of Ground.grid with the index of a robot's first terrain height. It differs between
@@ -217,15 +216,16 @@ class LaneBatch:
         self._places.constants[place, self._first_height] = place * self._heights.shape[1]
 
     def _enter(self, place: int, number: int) -> None:
-        """Changes the robot in a place into what it is after this number of events. Its nodes move
-        on in the same way; the origins of its bodies' frames move to their new centres of mass."""
+        """Changes the robot in a place into what it is after this number of events; see
+        Phase.entered()."""
         prepared = self._prepared[place]
         phases = prepared.driven.robot.phases
-        robot, p_BC = phases[number].robot, phases[number].p_BC - phases[self._phases[place]].p_BC
+        robot, before = phases[number].robot, phases[self._phases[place]]
         model = robot.model._replace(ground=robot.ground._replace(heights=None))
         self._put_constants(place, prepared.constants._replace(robot=model, senses=robot.senses))
-        bodies = self._places.states[place, -13 * len(p_BC) :]  # step.state, the last numbers
-        bodies[:] = with_origins(bodies, p_BC)
+        if number != self._phases[place]:
+            state = self._places.states[place, -13 * len(before.p_BC) :]  # step.state, at the end
+            state[:] = phases[number].entered(state, before)
         self._phases[place], self._events[place] = number, _begin(phases[number + 1 :])
 
     def change(self, place: int, driven: DrivenRobot) -> None:

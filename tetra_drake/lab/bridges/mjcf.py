@@ -3,7 +3,8 @@
 Spatial tendons over sites become cables, routed ones where they have more than two sites. A body
 with a free joint becomes a rigid body, with the parts that are welded to it and with MuJoCo's mass,
 centre and inertia. Its sites are nodes. A capsule or a cylinder between two nodes is a strut. Sites
-of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0. Nodes where
+of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0, or in
+the first key frame with velocities, with which the robot then starts. Nodes where
 spheres and capsules touch a level plane are feet, and the plane becomes the ground at z = 0. A free
 robot that is lower is raised to it.
 Actuators of tendons become oscillators. What an actuator exerts at control 0 belongs to its cable,
@@ -29,7 +30,12 @@ import numpy as np
 
 from tetra_drake.errors import InputError, escaped
 from tetra_drake.lab.bridges.mjcf_file import compiled_model
-from tetra_drake.lab.bridges.mjcf_forces import actuator_laws, limit_laws, obey_flags, tendon_laws
+from tetra_drake.lab.bridges.mjcf_forces import (
+    actuator_laws,
+    limit_laws,
+    obey_flags,
+    tendon_laws,
+)
 from tetra_drake.scenario.blueprint import TOLERANCE
 from tetra_drake.scenario.robot_structure import MOST_NODES
 from tetra_drake.scenario.structure_graph import unused_name
@@ -102,7 +108,13 @@ class _MjcfTranslation:
 
         obey_flags(model)
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
+        self.key = next(iter(np.flatnonzero(model.key_qvel.any(axis=1)).tolist()), None)
+        """Index of the key frame at which the robot starts; None if it starts at rest."""
+        if self.key is not None:
+            mujoco.mj_resetDataKeyframe(model, self.data, self.key)
         mujoco.mj_kinematics(model, self.data)
+        mujoco.mj_comPos(model, self.data)
+        mujoco.mj_comVel(model, self.data)
         self.nodes: dict[str, np.ndarray] = {}
         """Position (3,) of each node in the world."""
         self.root_of: dict[str, int] = {}
@@ -128,6 +140,9 @@ class _MjcfTranslation:
         """Stiffness, damping and free length of each tendon, or of its limit (tendons, 3)."""
         self.is_string = model.tendon_limited & (self.laws[:, 0] <= 0.0)
         self.laws[self.is_string] = limit_laws(model)[self.is_string]
+        poly, is_driven = model.tendon_stiffnesspoly, np.isin(np.arange(model.ntendon), self.driven)
+        self.hardens = poly.any(axis=1) & (poly >= 0.0).all(axis=1) & ~is_driven & ~self.is_string
+        """Tendons whose springs are polynomials of the stretch (tendons,)."""
         for what, kind, is_changed in self._changes():
             for number in np.flatnonzero(is_changed).tolist():
                 self._note(what, kind, number)
@@ -169,12 +184,15 @@ class _MjcfTranslation:
         struts, strut_names = _grouped(rods, "pairs")
         cables, cable_names = _grouped(itertools.starmap(self._cable, paths.items()), "pairs")
         self._close(joints)
+        bodies = self._bodies(used, dict(zip(strut_names, rods, strict=True)), ground)
+        motions = dict(zip(bodies, map(self._motion, used), strict=True))
         return {
             "nodes": {node: _coordinates(place, ground) for node, place in self.nodes.items()},
             "struts": struts,
             "cables": cables,
             "spheres": _grouped(spheres, "nodes")[0],
-            "bodies": self._bodies(used, dict(zip(strut_names, rods, strict=True)), ground),
+            "bodies": bodies,
+            "start": {} if self.key is None else {"rest": False, "bodies": motions},
             "joints": joints,
             **held,
             "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | held["anchors"],
@@ -250,6 +268,9 @@ class _MjcfTranslation:
         """Cable of a tendon over sites."""
         law = map(_text, self.laws[tendon], ["N/m", "N*s/m", "m"])
         settings = dict(zip(["stiffness", "damping", "free_length"], law, strict=True))
+        if self.hardens[tendon]:
+            terms = map(_text, self.model.tendon_stiffnesspoly[tendon], ["N/m^2", "N/m^3"])
+            settings |= zip(["quadratic", "cubic"], terms, strict=True)
         path = [node for node, _ in itertools.groupby(sites, self.node_of.__getitem__)]
         return _MjcfPart(self._name("tendon", tendon), path, settings)
 
@@ -311,9 +332,7 @@ class _MjcfTranslation:
         model, data = self.model, self.data
         bodies: Tree = {}
         for root in used:
-            parts = np.flatnonzero(self.roots == root)
-            mass, centres = model.body_mass[parts], self._places(parts, model.body_ipos[parts])
-            centre = mass @ centres / mass.sum()
+            parts, mass, centres, centre = self._masses(root)
             inertia = np.zeros((3, 3))
             for part in parts:
                 axes = data.ximat[part].reshape(3, 3)
@@ -333,6 +352,23 @@ class _MjcfTranslation:
                 "inertia": [f"{moment:.15g} kg*m^2" for moment in moments],
             }
         return bodies
+
+    def _masses(self, root: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Parts of a rigid body, their masses (parts,) and centres (parts, 3), and its centre."""
+        parts = np.flatnonzero(self.roots == root)
+        mass = self.model.body_mass[parts]
+        centres = self._places(parts, self.model.body_ipos[parts])
+        return parts, mass, centres, mass @ centres / mass.sum()
+
+    def _motion(self, root: int) -> Tree:
+        """Velocity of the centre of mass, and spin, of a rigid body at the start."""
+        spin, velocity = np.split(self.data.cvel[root], 2)
+        arm = self._masses(root)[-1] - self.data.subtree_com[self.model.body_rootid[root]]
+        along = velocity + np.cross(spin, arm)
+        return {
+            "velocity": [_text(x, "m/s") for x in along.tolist()],
+            "spin": [_text(x, "rad/s") for x in spin.tolist()],
+        }
 
     def _joints(self, connects: list[int]) -> tuple[Tree, Tree]:
         """Joints, from connects of two bodies, and anchors, from connects with the world."""
@@ -451,7 +487,9 @@ class _MjcfTranslation:
         yield "the setting 'limited' of tendons, left out", "tendon", is_set
         is_low = self.is_string & (model.tendon_range[:, 0] > 0.0)
         yield "lower limits of tendons, left out", "tendon", is_low
-        names = "actfrclimited frictionloss armature stiffnesspoly dampingpoly springyield"
+        is_left = model.tendon_stiffnesspoly.any(axis=1) & ~self.hardens
+        yield "the setting 'stiffnesspoly' of tendons, left out", "tendon", is_left
+        names = "actfrclimited frictionloss armature dampingpoly springyield"
         for name in names.split():  # earlier versions of MuJoCo have not all of them
             values = getattr(model, f"tendon_{name}", np.zeros(model.ntendon))
             is_set = [np.any(value) for value in values]
@@ -471,7 +509,7 @@ class _MjcfTranslation:
         yield "the armature of actuators, left out", "actuator", model.actuator_armature
         yield "mocap bodies, read as fixed", "body", model.body_mocapid >= 0
         yield "plug-ins, left out", "body", model.body_plugin >= 0
-        yield "key frames, left out", "key", np.ones(model.nkey)
+        yield "key frames, left out", "key", np.arange(model.nkey) != self.key
         yield "flexible parts, left out", "flex", np.ones(model.nflex)
 
 

@@ -255,10 +255,10 @@ def fit_values(
         xtol=TOLERANCE,
         gtol=np.finfo(float).eps,  # without it, no influence and no residual give NaN
     )
-    found = _result(problem, start, solution.x, time.perf_counter() - began)
+    result = _result(problem, start, solution.x, time.perf_counter() - began)
     if not solution.success:
-        found.warnings.append(f"least squares have not converged: {solution.message}")
-    return found
+        result.warnings.append(f"least squares have not converged: {solution.message}")
+    return result
 
 
 def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:

@@ -28,7 +28,8 @@ centimetre sideways with 0.5. Roll-v0 rewards each radian by which the robot has
 
 The time between actions is `simulation.control_period`, or the argument `control_period`. An
 episode ends (terminated) if the robot fails, and (truncated) at `simulation.duration`. With
-`disturbances` in the scenario, each episode has a draw of its own.
+`disturbances` or `sensing` in the scenario, each episode has a draw of its own. Observations have
+the errors of `sensing`, rewards are exact.
 
 `env.unwrapped.save()` returns the state of the robot and of its episode, `restore(states)` puts it
 back, also into another environment of the same kind, and returns the observation. So a tree search
@@ -134,14 +135,15 @@ class _Episodes:
         robot of the simulation; it draws the seed of the robot's disturbances. Returns the
         observations of all robots (N, size)."""
         seeds = [int(generators[place].integers(2**31)) for place in places]
-        readings = self.simulation.reset(seed=seeds, indices=places)
+        seen = self.simulation.reset(seed=seeds, indices=places)
+        readings = self.simulation.state
         self._steps[places], self._going[places] = 0, True
         for place in places.tolist():
             self._start[place] = self._steady[place] = readings.p_WN[place]
             self._time[place] = self._rate[place] = self._rolled[place] = 0.0
             self._rewarded[place] = 0.0
             self._offsets[place] = self._fitness(readings, place)
-        return self._observe(readings)
+        return self._observe(seen)
 
     def step(
         self, actions: np.ndarray, places: np.ndarray
@@ -153,7 +155,8 @@ class _Episodes:
         simulation = self.simulation
         if (over := places[~self._going[places]]).size:
             raise InputError(_SOURCE, "step", f"robot {over[0]} has no episode; reset() begins one")
-        readings = simulation.step(self._setpoints(actions), indices=places)
+        seen = simulation.step(self._setpoints(actions), indices=places)
+        readings = simulation.state
         self._steps[places] += 1
         if "rolled" in self._scenario.objective:
             rate = pitch_rates(readings, simulation.robot.structure)
@@ -176,7 +179,7 @@ class _Episodes:
         self._going &= ~(terminated | truncated)
         rewards = fitness - self._rewarded
         self._rewarded = fitness
-        return self._observe(readings), rewards, terminated, truncated
+        return self._observe(seen), rewards, terminated, truncated
 
     def save(self) -> States:
         """States of all robots and their episodes."""

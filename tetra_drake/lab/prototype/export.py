@@ -17,7 +17,7 @@ from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.files import check_folder, given_path, write_whole
 from tetra_drake.formatting import fixed, sentence
 from tetra_drake.laws import actuator
-from tetra_drake.laws.cable import CableLaw
+from tetra_drake.laws.cable import CableLaw, law_of
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.command_file import command_text, load_command, table_text
@@ -141,11 +141,12 @@ def actuator_loads(result: SimulationResult) -> Loads:
     limited = np.full_like(length, math.nan)
     if actuator.has_drive(constants):
         pull = np.vectorize(
-            lambda drive, length, rate, signal, *law: actuator.actuator_force(
-                constants, drive, length, rate, signal, CableLaw(*law)
+            lambda number, *motion: actuator.actuator_force(
+                constants, *motion, law_of(robot.model.cables, number)
             )
         )
-        _, _, drive_rate, limited, beside = pull(drives + _TOLERANCE, length, rate, signal, *law)
+        numbers, drawn = robot.driven, drives + _TOLERANCE
+        _, _, drive_rate, limited, beside = pull(numbers, drawn, length, rate, signal)
         load, left = tension - beside, actuator.wound(constants, drives, length)
         rate = actuator.wound(constants, drive_rate, rate)
 

@@ -35,7 +35,7 @@ from tetra_drake.robot.equilibrium import (
     stiffness_at_rest,
 )
 from tetra_drake.robot.ground import START_DEPTH
-from tetra_drake.robot.remarks import BEARS, sinking_remark, yielding_remark
+from tetra_drake.robot.remarks import BEARS, overload_remark, sinking_remark, yielding_remark
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import Structure, node_motions, node_positions
@@ -301,11 +301,14 @@ def structure_text(study: EquilibriumStudy) -> str:
 
 
 def _faults(study: EquilibriumStudy) -> list[str]:
-    """Warnings about a robot at rest: what gives way, such as its ground, nodes below ground that
-    cannot touch it, and struts that overlap."""
+    """Warnings about a robot at rest: that it starts otherwise, what gives way, such as its ground,
+    nodes below ground that cannot touch it, and struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
     allowed = START_DEPTH * structure.scale + robot.weight / robot.scenario.ground.stiffness
-    lines = [sentence(told) for told in (sinking_remark(robot), yielding_remark(robot)) if told]
+    remarks = [sinking_remark(robot), yielding_remark(robot)]
+    remarks.append(overload_remark(robot, study.cables["tension"].to_numpy()))
+    lines = ["Its `start` is not at rest."] if structure.start else []
+    lines += [sentence(told) for told in remarks if told]
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
         depths = [f"{node} ({units.shown(-z, 'm')})" for node, z in low.items()]

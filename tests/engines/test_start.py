@@ -1,0 +1,246 @@
+"""Robots that start turned and in motion, or are pushed, on all engines."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.anchored import BAR, scenario_of
+from helpers.converged import CONVERGED
+from pydrake.systems.framework import Context
+from scipy.integrate import solve_ivp
+
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.engines.mjcf import make_mjcf
+from tetra_drake.engines.mujoco import INSTALL, installed
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.simulation import Simulation
+from tetra_drake.lab.bridges.conversion import converted
+from tetra_drake.laws.terrain import Flat, Incline
+from tetra_drake.robot.parameter_space import seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import moved_nodes
+from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+G = 9.80665
+LOOSE = {"stiffness": 100.0, "damping": 0.1, "free_length": 9.0}
+BALLS = {
+    "nodes": {"a": [0.0, 0.0, 1.0], "b": [0.0, 0.2, 1.0]},
+    "masses": {"a": 0.1, "b": 0.1},
+    "cables": {"cord": LOOSE | {"pairs": [["a", "b"]]}},
+}
+ROD = {
+    "nodes": {"a": [0.0, 0.0, 1.0], "b": [0.4, 0.0, 1.0], "c": [0.0, 1.0, 1.0]},
+    "masses": {"c": 0.1},
+    "struts": {"rod": BAR | {"pairs": [["a", "b"]], "node_diameter": 0.0}},
+    "cables": {"cord": LOOSE | {"pairs": [["a", "c"]]}},
+}
+"""Two balls, and a rod and a ball, on a slack cord."""
+THROWN = {"rest": False, "velocity": [3.0, 0.0, 4.0]}
+PUSH = {"at": "0.1 s", "push": {"impulse": ["0 N*s", "0 N*s", "0.02 N*s"], "on": "b"}}
+SLOPE, FRICTION, SPIN = 0.2, 0.5, 3.0
+
+
+def thrown_balls(times: np.ndarray) -> np.ndarray:
+    height = 1.0 + 4.0 * times - 0.5 * G * times**2
+    return np.stack([3.0 * times, 0.2 + 0.0 * times, height], axis=1)
+
+
+def pushed_rod(times: np.ndarray) -> np.ndarray:
+    """The end b of a rod that turns by J l / 2 I, and flies by J / m, after 0.1 s."""
+    robot = Robot.of(scenario_of(ROD | {"start": {"rest": False}}))
+    mass, square = robot.structure.mass[0], robot.structure.unit_inertia[0, 2]
+    since = np.maximum(times - 0.1, 0.0) * 0.02 / mass
+    angle = 0.2 * since / square
+    along, up = 0.2 * np.cos(angle), 0.2 * np.sin(angle)
+    return np.stack([0.2 + along, 0.0 * times, 1.0 + since + up], axis=1)
+
+
+def swinging_rod(times: np.ndarray) -> np.ndarray:
+    """The end b of a pendulum that starts level, downwards."""
+    square = Robot.of(scenario_of(ROD | {"start": {"rest": False}})).structure.unit_inertia[0, 2]
+
+    def rate(_: float, y: np.ndarray) -> list[float]:
+        return [y[1], G * 0.2 * np.cos(y[0]) / (square + 0.2**2)]
+
+    solved = solve_ivp(rate, (0.0, 1.0), [0.0, SPIN], t_eval=times, rtol=1e-10, atol=1e-12)
+    down = solved.y[0]
+    return np.stack([0.4 * np.cos(down), 0.0 * down, 1.0 - 0.4 * np.sin(down)], axis=1)
+
+
+def sliding_balls(times: np.ndarray) -> np.ndarray:
+    """Up an incline against weight and friction, from a place of rest."""
+    deceleration = G * (np.sin(SLOPE) + FRICTION * np.cos(SLOPE))
+    way = 3.0 * times - 0.5 * deceleration * times**2
+    return np.stack([np.cos(SLOPE) * way, 0.2 + 0.0 * way, np.sin(SLOPE) * way], axis=1)
+
+
+SWUNG = {"rest": False, "velocity": [0.0, 0.0, -0.2 * SPIN], "spin": [0.0, SPIN, 0.0]}
+STARTS = {
+    "two balls are thrown": (BALLS | {"start": THROWN}, {}, thrown_balls, 1e-4),
+    "a rod is pushed at its end": (
+        ROD | {"start": {"rest": False}, "gravity": 0.0},
+        {"events": [PUSH]},
+        pushed_rod,
+        1e-5,
+    ),
+    "a pendulum swings on": (
+        ROD | {"masses": {}, "anchors": {"a": "xyz", "c": "xyz"}, "start": SWUNG},
+        {},
+        swinging_rod,
+        1e-3,
+    ),
+    "two balls slide uphill": (
+        BALLS | {"start": {"velocity": [3.0, 0.0, 0.0]}},
+        {"terrain": Incline(slope=SLOPE)},
+        sliding_balls,
+        2e-3,
+    ),
+}
+
+
+@pytest.mark.parametrize(("tree", "changes", "expected", "atol"), STARTS.values(), ids=STARTS)
+def test_what_is_thrown_spins_or_is_pushed_moves_as_analysis_says(
+    tree, changes, expected, atol, engine
+):
+    given = {"engine": engine, "friction.stiffness": "0 N/m", "simulation.sample_period": "0.01 s"}
+    scenario = scenario_of(tree, 0.3, **given, **changes)
+    found = simulate(scenario, seeded_gait(scenario), record=True).trajectory
+    p_WN = expected(found.time.values)
+    np.testing.assert_allclose(found.p_WN.sel(node="b"), p_WN, atol=atol)
+    assert np.ptp(p_WN, axis=0).max() > 0.1
+
+
+def turned(name: str, terrain: object = Flat(), **start: object) -> Scenario:
+    changes = {"robot.start": start, "terrain": terrain}
+    return load_scenario(name).with_changes(changes)
+
+
+def test_a_turned_robot_stands_as_deep_in_the_ground_as_before_and_keeps_its_shape():
+    still = Robot.of(load_scenario("six_bar")).structure
+    structure = Robot.of(turned("six_bar", turned={"pitch": "50 deg", "yaw": "1 rad"})).structure
+    before, after = (moved_nodes(each, each.initial_state)[:, 3:6] for each in (still, structure))
+    assert after[:, 2].min() == pytest.approx(before[:, 2].min(), abs=1e-12)
+    distances = [np.linalg.norm(p[:, None] - p, axis=2) for p in (before, after)]
+    np.testing.assert_allclose(distances[1], distances[0], atol=1e-12)
+    top = np.linalg.norm(after - before, axis=1).max()
+    assert top > 0.5 * distances[0].max()
+
+
+def test_a_spin_moves_all_bodies_about_the_robots_centre_and_turns_with_the_incline():
+    start = {"velocity": ["1 m/s", "0 m/s", "0 m/s"], "spin": ["0 rad/s", "0 rad/s", "2 rad/s"]}
+    level, sloping = (
+        Robot.of(turned("prism", each, **start)) for each in (Flat(), Incline(slope=0.3))
+    )
+    p_WB, v_WB = level.structure.p_WB, level.structure.v_WB
+    arms = p_WB - level.structure.mass @ p_WB / level.structure.mass.sum()
+    expected = np.add([1.0, 0.0, 0.0], np.cross([0.0, 0.0, 2.0], arms))
+    np.testing.assert_allclose(v_WB[:, 3:], expected, atol=1e-14)
+    np.testing.assert_allclose(v_WB[:, :3], [[0.0, 0.0, 2.0]] * 3, atol=1e-15)
+    up = [-np.sin(0.3), 0.0, np.cos(0.3)]
+    np.testing.assert_allclose(sloping.structure.v_WB[:, :3], [2.0 * np.array(up)] * 3, atol=1e-14)
+    assert np.abs(sloping.structure.v_WB[:, 3:] @ up).max() < 1e-14
+
+
+def velocities(diagram_context: Context) -> np.ndarray:
+    return diagram_context.get_continuous_state().get_generalized_velocity().CopyToVector()
+
+
+def test_the_diagrams_default_context_and_its_simulator_have_the_velocities_of_the_start():
+    robot = Robot.of(scenario_of(BALLS | {"start": THROWN}, engine="!Drake"))
+    diagram = MakeTensegrityDiagram(robot)
+    simulator = MakeSimulator(diagram, robot, Drake())
+    for context in (diagram.CreateDefaultContext(), simulator.get_context()):
+        np.testing.assert_array_equal(velocities(context), [0.0, 0.0, 0.0, 3.0, 0.0, 4.0] * 2)
+
+
+@pytest.mark.skipif(not installed(), reason=INSTALL)
+def test_a_robot_in_motion_is_the_same_after_a_way_to_mujoco_and_back(tmp_path: Path):
+    start = {"rest": False, "spin": [1.0, -2.0, 3.0], "turned": {"axis": [1.0, 2.0, 0.0]}}
+    start["turned"]["angle"] = 0.7
+    bent = {"e": [0.1, 0.1, 1.2], "f": [0.1, 0.3, 1.2]}
+    own = {"velocity": [0.0, 1.0, 0.0], "spin": [5.0, 0.0, 0.0]}
+    struts = {"bent": BAR | {"pairs": [["a", "e"], ["e", "f"]]}}
+    tree = ROD | {"nodes": ROD["nodes"] | bent, "start": start | {"bodies": {"bent": own}}}
+    scenario = scenario_of(
+        tree | {"masses": {}, "struts": struts | {"rod": BAR | {"pairs": [["b", "c"]]}}},
+        **{"friction.stiffness": "0 N/m", "engine": "!Mujoco"},
+    )
+    robot = Robot.of(scenario)
+    (tmp_path / "a.xml").write_text(make_mjcf(robot))
+    read = converted(tmp_path / "a.xml")
+    assert read.ignored is None
+    again = Robot.of(scenario.with_sections(robot=read))
+    found = [moved_nodes(each.structure, each.structure.initial_state) for each in (robot, again)]
+    order = [again.structure.node_names.index(name) for name in robot.structure.node_names]
+    np.testing.assert_allclose(found[1][order, :6], found[0][:, :6], atol=1e-9)
+    assert np.ptp(found[0][:, :3]) > 0.5
+
+
+def test_draws_vary_velocities_and_pushes():
+    spreads = {"robot.start.velocity[2]": 0.5, "events[0].push.impulse[2]": 0.5}
+    scenario = load_scenario("prism").with_changes(
+        {
+            "robot.start": {"velocity": ["0 m/s", "0 m/s", "2 m/s"]},
+            "events": [PUSH | {"push": PUSH["push"] | {"on": "n3"}}],
+            "disturbances": {"draws": 1, "spreads": spreads},
+        }
+    )
+    drawn = disturbed(scenario, draw_disturbances(scenario, (1, 2)))
+    ratios = (
+        drawn.robot.start.velocity[2] / 2.0,
+        drawn.events[0].push.impulse[2] / 0.02,
+    )
+    assert all(0.5 <= ratio <= 1.5 and ratio != 1.0 for ratio in ratios)
+    assert ratios[0] != ratios[1]
+
+
+def test_a_push_acts_once_also_on_a_robot_that_is_damaged_and_restored_afterwards():
+    tree = BALLS | {"start": {"rest": False}, "gravity": 0.0}
+    changes = {
+        "events": [PUSH],
+        "engine": CONVERGED["compiled"],
+        "simulation.control_period": "0.1 s",
+    }
+    simulation = Simulation(scenario_of(tree, 0.4, **changes))
+    for _ in range(2):
+        simulation.step(simulation.rest)
+    simulation.damage(0, cables=["cord a b"])
+    saved = simulation.save()
+    simulation.step(simulation.rest)
+    simulation.restore(saved)
+    readings = simulation.step(simulation.rest)
+    np.testing.assert_allclose(readings.v_WN[0, 1], [0.0, 0.0, 0.2], atol=1e-9)
+    np.testing.assert_allclose(readings.p_WN[0, 1, 2], 1.0 + 0.2 * 0.2, atol=1e-9)
+
+
+HELD = ROD | {"anchors": {"a": "xz", "c": "xyz"}, "masses": {}}
+JOINED = ROD | {"joints": {"knee": {"nodes": ["b", "d"]}}, "masses": {"c": 0.1, "d": 0.1}}
+JOINED |= {"nodes": ROD["nodes"] | {"d": [0.4, 0.0, 1.0]}}
+
+
+@pytest.mark.parametrize(
+    ("tree", "start", "words"),
+    [
+        (HELD, {"velocity": [0.0, 1.0, 0.5]}, ["a", "along z", "0.5 m/s"]),
+        (HELD, {"turned": {"yaw": 1.0}}, ["a", "along x", "0.0919"]),
+        (
+            JOINED,
+            {"bodies": {"d": {"velocity": [0.0, 2.0, 0.0]}}},
+            ["b from d", "along y", "2 m/s"],
+        ),
+    ],
+)
+def test_a_start_that_moves_what_is_held_is_refused(tree, start, words, refused):
+    with refused("anchored", "robot.start", *words):
+        Robot.of(scenario_of(tree | {"start": {"rest": False} | start}))
+    Robot.of(scenario_of(tree | {"start": {"rest": False, "velocity": [0.0, 1.0, 0.0]}}))
+
+
+def test_what_is_held_is_not_pushed(refused):
+    push = {"impulse": ["1 N*s", "0 N*s", "0 N*s"], "on": "a"}
+    with refused("scenario anchored", "events[0].push.impulse", "1 N*s along x", "a is held"):
+        scenario_of(HELD, events=[{"at": "0.1 s", "push": push}])
