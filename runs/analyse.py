@@ -263,10 +263,11 @@ def on_unseen_ground(
 def settings_of(scenario: Scenario) -> dict[str, Scenario]:
     """The scenario with each setting, by name. Settings that cannot simulate it are left out."""
     tight = Drake(scheme="runge_kutta3", accuracy=1e-3, max_step=0.002, mode_changes="witness")
-    # MuJoCo has no bristles.
-    smooth = {"friction.stiffness": "0 N/m"} if isinstance(scenario.friction, Coulomb) else {}
+    changes: dict[str, dict[str, Any]] = {TIGHT: {"engine": tight}, MUJOCO: {"engine": "!Mujoco"}}
+    if isinstance(scenario.friction, Coulomb):
+        changes[MUJOCO]["friction.stiffness"] = "0 N/m"  # MuJoCo has no bristles
     settings = {}
-    for name, change in {TIGHT: {"engine": tight}, MUJOCO: {"engine": "!Mujoco", **smooth}}.items():
+    for name, change in changes.items():
         with contextlib.suppress(InputError):
             changed = scenario.with_changes(change)
             check_scenario(changed)

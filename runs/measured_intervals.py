@@ -69,6 +69,7 @@ LEAP = 6
 """Number of sets of cable lengths from one pose of the spine that is computed to the next. Between
 them, the difference from the pose of the authors' statics is interpolated."""
 SPINE_AXIS = np.array([0.0, 0.0, 0.1785])
+LAW = ("stiffness", "tension")
 TWIST = 15.0
 """Twist (degrees) of Laika's centre vertebra at which the loads of its feet are computed."""
 
@@ -254,7 +255,7 @@ def simplex_tests(
 ) -> Values:
     """Heights and forces of the simplex under loads (kN) per upper node, or their means; or its
     forces as one tube is lengthened, in mm from the self-stress (kN) on."""
-    _, base, wanted = prestressed(scenario, unknown, self_stress)
+    base, wanted = prestressed(scenario, unknown, self_stress)[1:]
     tests = {f"{load:.2f} kN": (load * (1.0 + unknown["load"]), 0.0) for load in loads}
     tests |= {f"{by:+g} mm": (0.0, by + unknown["lengthening"]) for by in lengthenings}
     values: Values = {}
@@ -398,7 +399,7 @@ def measured_rise(share: float) -> list[float]:
 
 def jumps_measured() -> Values:
     """Middles of the measured ranges of the jumper's rises."""
-    return {f"rise at {100.0 * share:.0f} %": np.mean(measured_rise(share)) for share in JUMPS}
+    return {f"rise at {100.0 * share:.0f} %": sum(measured_rise(share)) / 2.0 for share in JUMPS}
 
 
 def standing(name: str) -> Scenario:
@@ -483,7 +484,7 @@ def laika_lifts(scenario: Scenario, unknown: Unknowns, feet: Mapping[str, Any]) 
             if name in ("HL", "HR"):
                 like, pulled = ("HL", unknown["pulled in"]) if name[1] == side else ("HR", 0.0)
             a, b = (np.array(structure.nodes[node]) for node in group.pairs[0])
-            stiffness, tension = structure.cables[like].stiffness, structure.cables[like].tension
+            stiffness, tension = (getattr(structure.cables[like], key) for key in LAW)
             free = float(np.linalg.norm(a - b)) - tension / stiffness - pulled / 1e3
             law = {"stiffness": f"{stiffness!r} N/m", "tension": None, "free_length": f"{free!r} m"}
             changes |= {f"robot.cables.{name}.{key}": value for key, value in law.items()}

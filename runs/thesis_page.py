@@ -102,7 +102,8 @@ def weights_pattern(run: Run) -> dict[str, str]:
 
 
 def trials_numbers(run: Run) -> dict[str, Any]:
-    """Numbers of the thesis's chapter 3 from a run, as text, beside those of readings.py."""
+    """Numbers of the thesis's chapter 3 from a run, as text. The record of readings
+    has more of them."""
     best, duration = run.best().set_index("trial"), run.scenario.simulation.duration
     trial, robot = int(best["fitness"].idxmax()), Robot.of(run.scenario)
     iterations = run.iterations.groupby("trial")["iteration"].max()
