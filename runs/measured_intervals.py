@@ -69,7 +69,6 @@ LEAP = 6
 """Number of sets of cable lengths from one pose of the spine that is computed to the next. Between
 them, the difference from the pose of the authors' statics is interpolated."""
 SPINE_AXIS = np.array([0.0, 0.0, 0.1785])
-LAW = ("stiffness", "tension")
 TWIST = 15.0
 """Twist (degrees) of Laika's centre vertebra at which the loads of its feet are computed."""
 
@@ -399,7 +398,9 @@ def measured_rise(share: float) -> list[float]:
 
 def jumps_measured() -> Values:
     """Middles of the measured ranges of the jumper's rises."""
-    return {f"rise at {100.0 * share:.0f} %": sum(measured_rise(share)) / 2.0 for share in JUMPS}
+    return {
+        f"rise at {100.0 * share:.0f} %": float(np.mean(measured_rise(share))) for share in JUMPS
+    }
 
 
 def standing(name: str) -> Scenario:
@@ -484,7 +485,9 @@ def laika_lifts(scenario: Scenario, unknown: Unknowns, feet: Mapping[str, Any]) 
             if name in ("HL", "HR"):
                 like, pulled = ("HL", unknown["pulled in"]) if name[1] == side else ("HR", 0.0)
             a, b = (np.array(structure.nodes[node]) for node in group.pairs[0])
-            stiffness, tension = (getattr(structure.cables[like], key) for key in LAW)
+            stiffness, tension = (
+                getattr(structure.cables[like], key) for key in ("stiffness", "tension")
+            )
             free = float(np.linalg.norm(a - b)) - tension / stiffness - pulled / 1e3
             law = {"stiffness": f"{stiffness!r} N/m", "tension": None, "free_length": f"{free!r} m"}
             changes |= {f"robot.cables.{name}.{key}": value for key, value in law.items()}

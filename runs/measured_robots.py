@@ -45,7 +45,7 @@ HEIGHT_UNCERTAINTY = 2e-4
 SADDLE = ("horizontal_bottom", "horizontal_top", "saddle_bottom", "saddle_top")
 """Cables of the spine, in the order of its measurements."""
 AXES = {"x": ("x_m", 1e-3), "y": ("y_m", 1e-3), "angle": ("rad", math.radians(1.0))}
-"""Columns of the measured poses, and the units (mm, degrees) of pages."""
+"""Columns of the measured poses, and their units (mm, degrees) on the page."""
 CENTRE, FLOOR = 0.0291, 0.3
 """Distance (m) of the spine's node c behind the origin of its pose, and height (m) of the origin in
 spine.yaml."""

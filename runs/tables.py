@@ -11,6 +11,7 @@ Each table is in a Markdown file between two lines:
 from __future__ import annotations
 
 import functools
+import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -26,6 +27,8 @@ from PIL import Image
 from readings import RECORD, load_record
 from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
 from script import run_script
+from sine import RECORD as SINES
+from sine import TRIED
 
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
@@ -226,7 +229,7 @@ def results_table(runs: Runs) -> str:
 
 def trials_table(name: str, runs: Runs) -> str:
     """Table of the fittest gait of each trial of a run, on all engines and on disturbed robots.
-    Below it, the trials with different distances on the engines."""
+    Below it, the trials with different distances on the engines, and the farthest sine."""
     run, units, rows = runs[name], scenario_of(name).units, []
     for trial, gait in run.best_gaits.iterrows():
         judged, (compiled, diagram, mujoco) = run.disturbed.loc[trial], distances_of(run, trial)
@@ -239,7 +242,8 @@ def trials_table(name: str, runs: Runs) -> str:
         }
         rows.append(row)
     apart_by = f"{rounded(APART / units.length, 1)} {units.length_word}"
-    return rendered("trials.md", rows=rows, units=units, apart_by=apart_by)
+    sine = json.loads(read_text(SINES, "record")).get(name)
+    return rendered("trials.md", rows=rows, units=units, apart_by=apart_by, sine=sine, tried=TRIED)
 
 
 def partings_table(name: str, other: str) -> str:

@@ -24,6 +24,7 @@ from page import rendered
 from record import load_times
 from script import read_record, run_script
 from settle import difference_of_means, numbers
+from sine import TRIED
 from tables import aspect, best_gait
 from thesis_figures import save_figures
 
@@ -102,8 +103,7 @@ def weights_pattern(run: Run) -> dict[str, str]:
 
 
 def trials_numbers(run: Run) -> dict[str, Any]:
-    """Numbers of the thesis's chapter 3 from a run, as text. The record of readings
-    has more of them."""
+    """Numbers of the thesis's chapter 3 from a run, as text; readings.py has the rest."""
     best, duration = run.best().set_index("trial"), run.scenario.simulation.duration
     trial, robot = int(best["fitness"].idxmax()), Robot.of(run.scenario)
     iterations = run.iterations.groupby("trial")["iteration"].max()
@@ -226,7 +226,7 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
         former=trials_numbers(load_run(FORMER)),
-        sines=sines,
+        tried=TRIED,
         sine=lambda name: fixed(sines[name]["distance_in"]),
         setting=setting,
         reached=reached,

@@ -1,0 +1,287 @@
+"""Problems whose motion is known, on the three engines: one page.
+
+    python runs/verification.py [PROBLEM ...]
+
+Simulates the problems of verification/problems.yaml, or the given ones, at the defaults and at fine
+settings of each engine, and writes the page README.md with its curves and results.json.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import verification_references as references
+import yaml
+from page import rendered
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.files import read_text, write_whole
+from tetra_drake.laws.cable import CableLaw, elastic_energy
+from tetra_drake.laws.kinematics import rigid_motions
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.parameter_space import seeded_gait
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.refusals import TAG
+
+HERE = Path(__file__).parent / "verification"
+RESULTS = "results.json"
+PROBLEMS: dict[str, dict[str, Any]] = yaml.safe_load((HERE / "problems.yaml").read_text("utf-8"))[
+    "problems"
+]
+ENGINES = {
+    "compiled": ("!Compiled {}", "!Compiled {tolerance: 1e-7 m/s, max_step: 0.2 ms}"),
+    "drake": ("!Drake {}", "!Drake {scheme: runge_kutta3, accuracy: 1e-7, max_step: 0.5 ms}"),
+    "mujoco": ("!Mujoco {}", "!Mujoco {step: 20 us}"),
+}
+"""Each engine at its defaults, and fine."""
+STEPS = {
+    "compiled": "!Compiled {{tolerance: 10 m/s, max_step: {} s}}",
+    "drake": "!Drake {{scheme: runge_kutta3, accuracy: 1, max_step: {} s}}",
+    "mujoco": "!Mujoco {{step: {} s}}",
+}
+"""Engines whose steps all have one length, for the order of convergence."""
+SAMPLES = 100
+Array = np.ndarray
+
+
+def cases_of(problem: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Changes of the scenario in each case."""
+    if turns := problem.get("turns"):
+        angles = np.random.default_rng(0).uniform(-1.0, 1.0, (turns, 2))
+        key = "robot.start.bodies.{}.turned"
+        return [
+            {key.format("one"): {"yaw": f"{a} rad"}, key.format("two"): {"roll": f"{b} rad"}}
+            for a, b in angles.tolist()
+        ]
+    if grid := problem.get("grid_of"):
+        return [
+            {
+                "friction.static": mu,
+                "friction.kinetic": mu,
+                "terrain": f"!Incline {{slope: {degrees} deg}}",
+                "mu": mu,
+                "degrees": degrees,
+            }
+            for mu in grid["mu"]
+            for degrees in grid["degrees"]
+        ]
+    return problem.get("cases", [{}])
+
+
+def scenario_of(problem: Mapping[str, Any], case: Mapping[str, Any]) -> Scenario:
+    """The scenario of a case of a problem, on the compiled engine."""
+    duration = float(problem["duration"])
+    changes = {
+        "simulation.duration": f"{duration} s",
+        "simulation.steady_from": "0 s",
+        "simulation.sample_period": f"{duration / SAMPLES} s",
+        "simulation.max_evaluations": 10**9,
+        "cpg.gain": 0.0,
+        "strut_contact": "!Nothing",
+        "terrain": "!Flat" if problem.get("ground") else "!Nothing",
+    }
+    if "tree" in problem:
+        changes["robot"] = {TAG: "Structure"} | dict(problem["tree"])
+    changes |= problem.get("changes", {}) | problem.get("base", {})
+    own = {key: value for key, value in case.items() if "." in key or key == "terrain"}
+    scenario = load_scenario(problem.get("scenario", "prism")).with_changes(changes)
+    return scenario.with_changes(own) if own else scenario
+
+
+def energy_of(result: SimulationResult) -> tuple[Array, Array]:
+    """Energy (times,) in J of bodies, cables and springs, and of its motion alone."""
+    structure, model, seen = result.robot.structure, result.robot.model, result.trajectory
+    p_WN, v_WN, p_WB = (seen[name].values for name in ("p_WN", "v_WN", "p_WB"))
+    energy = structure.mass * result.scenario.robot.gravity @ p_WB[..., 2].T
+    law: Any = CableLaw.of(structure.cables)
+    stretch = np.maximum(seen.length.values - law.free_length, 0.0)
+    energy += elastic_energy(stretch, law).sum(axis=1)
+    anchors, joints = model.anchors, model.joints
+    held = (p_WN[:, anchors.nodes] - anchors.places) ** 2 * anchors.stiffness
+    apart = ((p_WN[:, joints.node_a] - p_WN[:, joints.node_b]) ** 2).sum(axis=2)
+    energy += 0.5 * (held.sum(axis=(1, 2)) + apart @ joints.stiffness)
+    motion = np.zeros(len(p_WN))
+    for body, (first, end) in enumerate(
+        zip(structure.first_node[:-1], structure.first_node[1:], strict=True)
+    ):
+        q = seen.q_WB.values[:, body]
+        for time, (p, v) in enumerate(zip(p_WN[:, first:end], v_WN[:, first:end], strict=True)):
+            rigid = rigid_motions(p - p_WB[time, body]).reshape(-1, 6)
+            w, speed = np.split(np.linalg.lstsq(rigid, v.ravel(), rcond=1e-9)[0], 2)
+            xx, yy, zz, xy, xz, yz = structure.unit_inertia[body]
+            turn = references.Rotation.from_quat(q[time, [1, 2, 3, 0]])
+            own = turn.inv().apply(w)
+            spin = own @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ own
+            motion[time] += 0.5 * structure.mass[body] * (speed @ speed + spin)
+    return energy + motion, motion
+
+
+def followed(problem: Mapping[str, Any], result: SimulationResult) -> Array:
+    """What a problem compares, at the samples."""
+    seen, what = result.trajectory, problem["follow"]
+    if what == "energy":
+        energy, motion = energy_of(result)
+        return 1.0 + (energy - energy[0]) / motion[0]
+    if what == "rebound":
+        speeds = seen.v_WN.sel(node="a", axis="z").values
+        return -speeds / speeds[0]
+    node, axis = what
+    return np.asarray(seen.p_WN.sel(node=node, axis=axis).values)
+
+
+def run(problem: Mapping[str, Any], engine: str, *, drift: bool = False) -> dict[str, Any]:
+    """Numbers that an engine finds, `x`, `found` and `expected`, and drift and wall time."""
+    x, found, expected = (list[float]() for _ in range(3))
+    drifts, wall = [0.0], 0.0
+    cases = cases_of(problem)
+    for number, case in enumerate(cases):
+        bristles = "0 N/m" if engine.startswith("!Mujoco") else "30 kN/m"
+        changes = {"engine": engine, "friction.stiffness": bristles}
+        scenario = scenario_of(problem, case).with_changes(changes)
+        result = simulate(scenario, seeded_gait(scenario), record=True)
+        wall += result.wall_time
+        times = result.trajectory.time.values
+        values = followed(problem, result)
+        own = dict(case) | dict(problem) | {"ground": scenario.ground, "robot": result.robot}
+        if "node" in result.trajectory.dims and isinstance(problem["follow"], list):
+            own["first"] = result.trajectory.p_WN.sel(node=problem["follow"][0]).values[0]
+        known = references.__dict__.get(problem["name"], lambda times, case: 1.0 + 0.0 * times)
+        right = known(times, own)
+        if drift:
+            energy = energy_of(result)[0]
+            drifts.append(float(np.abs(energy - energy[0]).max()))
+        if len(cases) > 1:
+            times, values, right = np.array([number]), values[-1:], right[-1:]
+        x, found, expected = [*x, *times], [*found, *values], [*expected, *right]
+    numbers = {"x": x, "found": found, "expected": expected}
+    return {k: np.array(v, float) for k, v in numbers.items()} | {"drift": max(drifts), "s": wall}
+
+
+def order_of(problem: Mapping[str, Any], name: str) -> float | None:
+    """Order of convergence, from the differences of runs with a step, its half and its quarter."""
+    if not (step := float(problem.get("order", {}).get(name, 0.0))):
+        return None
+    runs = [run(problem, STEPS[name].format(step / 2**k))["found"] for k in range(3)]
+    coarse, fine = (np.abs(a - b).max() for a, b in itertools.pairwise(runs))
+    return math.log2(coarse / fine)
+
+
+def verified(name: str, engines: Mapping[str, tuple[str, str]] = ENGINES) -> dict[str, Any]:
+    """Results of a problem: curves, and for each engine the greatest errors."""
+    problem = completed(name)
+    if problem.get("follow") == "rest":
+        x, found, expected = getattr(references, name)()
+        error = float(np.abs(np.subtract(found, expected)).max() / np.ptp(expected))
+        own: dict[str, Any] = {"x": x, "expected": expected, "all": found}
+        return own | {"engines": {"all": {"error": error}}}
+    results: dict[str, Any] = {"engines": {}}
+    is_smooth = problem.get("order") is not None
+    for engine, (default, fine) in engines.items():
+        if engine in problem.get("lacks", {}):
+            continue
+        try:
+            usual = run(problem, default, drift=is_smooth)
+            close = usual if problem.get("long") else run(problem, fine, drift=is_smooth)
+            order = order_of(problem, engine)
+        except (SimulationFailure, InputError) as failure:
+            results["engines"][engine] = {"failure": str(failure).splitlines()[0]}
+            continue
+        size = float(np.ptp(usual["expected"])) or 1.0
+        results |= {"x": usual["x"].tolist(), "expected": usual["expected"].tolist(), "size": size}
+        results[engine] = usual["found"].tolist()
+        results["engines"][engine] = {
+            "error": float(np.abs(usual["found"] - usual["expected"]).max() / size),
+            "fine": float(np.abs(close["found"] - close["expected"]).max() / size),
+            "order": order,
+            "drift": usual["drift"] if is_smooth else None,
+            "fine_drift": close["drift"] if is_smooth else None,
+            "s": usual["s"],
+            "fine_s": close["s"],
+        }
+    return results
+
+
+def completed(name: str) -> dict[str, Any]:
+    """A problem with its structure."""
+    problem: dict[str, Any] = {"name": name} | PROBLEMS[name]
+    if "beads" in problem:
+        problem["tree"] = references.beads_tree(name, problem["beads"])
+    elif "grid" in problem:
+        problem["tree"] = references.four_bar_tree(problem["grid"])
+        problem["name"] = "four_bar"
+    elif "structure" in problem:
+        problem["tree"] = problem["structure"]
+    return problem
+
+
+COLOURS = {"compiled": "#0072b2", "all": "#0072b2", "drake": "#d55e00", "mujoco": "#009e73"}
+
+
+def curves(result: Mapping[str, Any]) -> str:
+    """A picture in SVG: the reference grey, the engines in their colours."""
+    x, expected = np.array(result["x"], float), np.array(result["expected"], float)
+    lines = {"#bbb": expected} | {c: result[e] for e, c in COLOURS.items() if e in result}
+    values = np.concatenate([*map(np.asarray, lines.values())])
+    low, size = values.min(), np.ptp(values) or 1.0
+    across = 4.0 + 152.0 * (x - x.min()) / (np.ptp(x) or 1.0)
+    shapes = []
+    for colour, line in lines.items():
+        up = 56.0 - 52.0 * (np.asarray(line) - low) / size
+        points = " ".join(f"{a:.0f},{b:.1f}" for a, b in zip(across, up, strict=True))
+        width = 4 if colour == "#bbb" else 1
+        if len(x) > 20:
+            shapes.append(f'<polyline points="{points}" stroke="{colour}" stroke-width="{width}"/>')
+            continue
+        dots = "".join(f"M{point}h0" for point in points.split())
+        shapes.append(f'<path d="{dots}" stroke="{colour}" stroke-width="{2 * width + 2}"/>')
+    box = 'viewBox="0 0 160 60" width="160" height="60" fill="none" stroke-linecap="round"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {box}>{"".join(shapes)}</svg>\n'
+
+
+def write_page(results: Mapping[str, Any]) -> None:
+    """Writes the page from the results by problem."""
+    families: dict[str, dict[str, Any]] = {}
+    for name, problem in PROBLEMS.items():
+        if name in results:
+            families.setdefault(problem["family"], {})[name] = problem
+    seconds = sum(
+        x.get("s", 0.0) + x.get("fine_s", 0.0)
+        for r in results.values()
+        for x in r["engines"].values()
+    )
+    text = rendered(
+        "verification.md",
+        families=families,
+        results=results,
+        engines=[*ENGINES],
+        minutes=seconds / 60.0,
+    )
+    write_whole(HERE / "README.md", text)
+
+
+def main(names: Sequence[str]) -> None:
+    """Runs problems, all without names, and writes the page."""
+    file, results = HERE / RESULTS, dict[str, Any]()
+    for name in names or PROBLEMS:
+        found = verified(name)
+        if "x" in found:
+            write_whole(HERE / f"{name}.svg", curves(found))
+        results[name] = {"size": found.get("size", 1.0), "engines": found["engines"]}
+        print(name, results[name], flush=True)
+    if names and file.exists():
+        results = json.loads(read_text(file, "results")) | results
+    write_whole(file, json.dumps(results, indent=1) + "\n")
+    write_page(results)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,469 @@
+"""Structures of the problems of verification/problems.yaml that are made by rules, and references.
+
+A reference is a closed form, an elliptic integral or equations of its own, solved by SciPy. It
+knows the numbers of the problem, not the engines.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq, least_squares
+from scipy.spatial.transform import Rotation
+from scipy.special import ellipj, ellipk
+
+from tetra_drake.lab.study.equilibrium import (
+    EquilibriumStudy,
+    robot_of_structure,
+    study_equilibrium,
+)
+from tetra_drake.laws.matsuoka import Network
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.systems import MatsuokaCpg
+
+G = 9.80665
+Array = np.ndarray
+Case = Mapping[str, Any]
+"""Changes of a case by scenario key, with the problem's own keys; `tree` is its structure."""
+
+
+def solved(rate: Callable[..., Any], start: Any, times: Array, **options: Any) -> Array:
+    """States (states, times) by SciPy's solve_ivp with small errors."""
+    given = {"rtol": 1e-11, "atol": 1e-12, "method": "DOP853"} | options
+    return np.asarray(solve_ivp(rate, (0.0, times[-1]), start, t_eval=times, **given).y)
+
+
+def number(text: Any) -> float:
+    """The number of a quantity in SI units."""
+    return float(str(text).split()[0])
+
+
+# Bodies
+
+
+def pendulum(times: Array, case: Case) -> Array:
+    rate, k = math.sqrt(0.5 * G / (1.0 / 3.0 + 0.25 * 0.004**2)), math.sin(math.pi / 4)
+    sine = k * ellipj(ellipk(k**2) - rate * times, k**2)[0]
+    return -np.sin(2.0 * np.arcsin(sine))
+
+
+def four_bar_tree(windows: int) -> dict[str, Any]:
+    """Cranks a-b and couplers between them, rods of 1 m and 1 kg."""
+    nodes, pairs = {"w": [0, 9, 0]}, [[f"a{i}", f"b{i}"] for i in range(windows + 1)]
+    for i in range(windows + 1):
+        nodes |= {f"a{i}": [i, 0, 0], f"b{i}": [i, 0, 1]}
+    pairs += [[f"b{i}", f"b{i + 1}"] for i in range(windows)]
+    spin = {"velocity": ["-0.5 m/s", 0, 0], "spin": [0, "1 rad/s", 0]}
+    cranks = {f"a{i} b{i}": spin for i in range(windows + 1)}
+    return {
+        "unit": "m",
+        "nodes": nodes,
+        "struts": {"rod": BAR | {"pairs": pairs, "density": f"{1.0 / (math.pi * 4e-6)} kg/m^3"}},
+        "cables": {"cord": CORD | {"pairs": [["a0", "w"]]}},
+        "pinned": [f"b{i}" for i in range(windows + 1)],
+        "anchors": {"w": "xyz"} | {f"a{i}": "xyz" for i in range(windows + 1)},
+        "start": {"rest": False, "velocity": ["1 m/s", 0, 0], "bodies": cranks},
+    }
+
+
+BAR = {"diameter": "4 mm", "node_diameter": "0 m", "contact_radius": "0 m"}
+CORD = {"stiffness": "1 N/m", "damping": "0 N*s/m", "free_length": "900 m"}
+
+
+def four_bar(times: Array, case: Case) -> Array:
+    n = case["grid"]
+    square = G * (0.5 * (n + 1) + n) / ((n + 1) * (1.0 / 3.0 + 1e-6) + n)
+    return np.sin(solved(lambda _, y: [y[1], square * math.sin(y[0])], [0.0, 1.0], times)[0])
+
+
+POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 0, -1], [1, 1, -1], [0, 1, -1], [0, 1, 0]], float)
+AXES = np.cross(POINTS - np.roll(POINTS, 1, axis=0), np.roll(POINTS, -1, axis=0) - POINTS)
+"""Joints of Bricard's linkage, along edges of a cube, and their axes."""
+
+
+def bricard(times: Array, case: Case) -> Array:
+    def places(angles: Array) -> tuple[Array, list[Rotation]]:
+        turn, points, turns = Rotation.identity(), [POINTS[0]], []
+        for i in range(5):
+            turn = turn * Rotation.from_rotvec(angles[i] * AXES[i])
+            turns.append(turn)
+            points.append(points[-1] + turn.apply(POINTS[i + 1] - POINTS[i]))
+        return np.array(points), turns
+
+    def gap(others: Array, first: float) -> Array:
+        points, turns = places(np.array([first, *others]))
+        return np.append(points[5] - POINTS[5], turns[4].apply(AXES[5]) - AXES[5])
+
+    grid, angles = np.arange(-1.2, 1.2001, 0.01), []
+    for side in (grid[grid <= 1e-9][::-1], grid[grid > 1e-9]):
+        known = np.zeros(4)
+        found = []
+        for first in side:
+            known = least_squares(gap, known, args=(first,), xtol=1e-14, ftol=1e-14, gtol=1e-14).x
+            found.append([first, *known])
+        angles += found[::-1] if side[0] < 0.005 else found
+    points = np.array([places(np.array(each))[0] for each in angles])
+    path = CubicSpline(grid, points)
+    inertia, height = np.zeros_like(grid), np.zeros_like(grid)
+    for i in range(5):  # of a rod: m (a a + a b + b b) / 3
+        a, b = path(grid, 1)[:, i], path(grid, 1)[:, i + 1]
+        inertia += ((a * a + a * b + b * b).sum(axis=1)) / 3.0
+        height += 0.5 * (points[:, i, 2] + points[:, i + 1, 2])
+    mass, level = CubicSpline(grid, inertia), CubicSpline(grid, height)
+
+    def rate(_: float, y: Array) -> list[float]:
+        return [y[1], (-0.5 * mass(y[0], 1) * y[1] ** 2 - G * level(y[0], 1)) / mass(y[0])]
+
+    return path(solved(rate, [0.0, 0.0], times, rtol=1e-9, atol=1e-10)[0])[:, 3, 0]
+
+
+def turning(inertia: Array, spin: Array, arm: Array, times: Array) -> Array:
+    """Ways (times, 3) of a point of a free body, by Euler's equations."""
+
+    def rate(_: float, y: Array) -> Array:
+        turn, w = Rotation.from_quat(y[[1, 2, 3, 0]]), y[4:]
+        momentum = inertia @ w
+        q = 0.5 * np.array([-y[1:4] @ w, *(y[0] * w + np.cross(y[1:4], w))])
+        return np.append(q, np.linalg.solve(inertia, np.cross(momentum, w))) if turn else q
+
+    y = solved(rate, [1.0, 0.0, 0.0, 0.0, *spin], times)
+    return np.asarray(Rotation.from_quat(y[[1, 2, 3, 0]].T).apply(arm))
+
+
+BRICK = np.diag([2.568e-3, 8.421e-3, 9.755e-3])
+
+
+def brick(times: Array, case: Case) -> Array:
+    return turning(BRICK, np.radians([10.0, 20.0, 30.0]), np.array([0.1, 0, 0]), times)[:, 1]
+
+
+def dzhanibekov(times: Array, case: Case) -> Array:
+    return turning(BRICK, np.array([0, 10.0, 0.1]), np.array([0, 0.05, 0]), times)[:, 1]
+
+
+def projectile(times: Array, case: Case) -> Array:
+    return 1.0 + 4.0 * times - 0.5 * G * times**2
+
+
+def double_pendulum(times: Array, case: Case) -> Array:
+    lengths, radius = np.array([0.4, 0.3]), 0.004
+    m, n = masses = 1200.0 * math.pi * radius**2 * lengths
+    i, j = masses * (lengths**2 / 12.0 + radius**2 / 4.0)
+
+    def rate(_: float, y: Array) -> Array:
+        a, b, a_rate, b_rate = y
+        across = 0.5 * n * 0.4 * 0.3
+        mixed, bent = across * math.cos(a - b), across * math.sin(a - b)
+        inertia = [[i + (0.25 * m + n) * 0.16, mixed], [mixed, j + 0.25 * n * 0.09]]
+        force = [
+            -bent * b_rate**2 - (0.5 * m + n) * G * 0.4 * math.sin(a),
+            bent * a_rate**2 - 0.5 * n * G * 0.3 * math.sin(b),
+        ]
+        return np.append(y[2:], np.linalg.solve(inertia, force))
+
+    a, b = solved(rate, [math.pi / 2, math.pi / 2, 0.0, 0.0], times)[:2]
+    return 0.4 * np.sin(a) + 0.3 * np.sin(b)
+
+
+def precession(times: Array, case: Case) -> Array:
+    structure = case["robot"].structure
+    arms = structure.p_WB - structure.mass @ structure.p_WB / structure.mass.sum()
+    inertia = np.zeros((3, 3))
+    for mass, unit, q, arm in zip(
+        structure.mass, structure.unit_inertia, structure.q_WB, arms, strict=True
+    ):
+        xx, yy, zz, xy, xz, yz = mass * unit
+        turn = Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix()
+        inertia += turn @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ turn.T
+        inertia += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    first = case["first"]
+    centre = structure.mass @ structure.p_WB / structure.mass.sum()
+    return centre[2] + turning(inertia, np.array([1.0, 0.0, 6.0]), first - centre, times)[:, 2]
+
+
+# Contact
+
+
+def backspin(times: Array, case: Case) -> Array:
+    until = 3.0 / (3.5 * 0.5 * G)
+    sliding = np.minimum(times, until)
+    way = 2.0 * sliding - 0.25 * G * sliding**2
+    return way + (2.0 - 0.5 * G * until) * (times - sliding)
+
+
+def hoop(times: Array, case: Case) -> Array:
+    slope = math.radians(20.0)
+    rolls = 0.0 if "friction.static" in case else number(case["robot.bodies.one.inertia"][0])
+    way = 0.5 * G * math.sin(slope) / (1.0 + rolls / (0.5 * 0.05**2)) * times**2
+    return -0.05 * math.sin(slope) - math.cos(slope) * way
+
+
+def ramp(times: Array, case: Case) -> Array:
+    slope, mu = math.radians(case["degrees"]), case["mu"]
+    pull = max(0.0, math.sin(slope) - mu * math.cos(slope))
+    return -0.5 * math.cos(slope) * G * pull * times**2
+
+
+def stopping(times: Array, case: Case) -> Array:
+    speed = number(case["robot.start.velocity"][0])
+    return np.full_like(times, speed**2 / G)
+
+
+def hunt_crossley(
+    times: Array, z: float, v: float, m: float, k: float, c: float, g: float
+) -> Array:
+    def rate(_: float, y: Array) -> list[float]:
+        depth = max(0.0, -y[0])
+        return [y[1], max(0.0, k * depth - c * depth * y[1]) / m - g]
+
+    return solved(rate, [z, v], times, max_step=1e-4, method="RK45", rtol=1e-9)
+
+
+def bounce(times: Array, case: Case) -> Array:
+    return hunt_crossley(times, 0.1, 0.0, 0.1, 1e4, 2e3, G)[0]
+
+
+def settling(times: Array, case: Case) -> Array:
+    ground, speed = case["ground"], 1e-3 * case["mm_per_s"]
+    y = hunt_crossley(times, 1e-5, -speed, 0.02, ground.stiffness, ground.damping, 0.0)
+    return y[1] / speed
+
+
+def stick_slip(times: Array, case: Case) -> Array:
+    speed, rate, low, high = 0.1, math.sqrt(2.0), 0.25, 0.75
+    slip = 2.0 * (math.pi - math.atan(0.25 * rate / speed)) / rate
+    period = slip + (high - low) / speed
+    jump = speed * period
+    since = (times - high / speed) % period
+    cycles = np.floor((times - high / speed) / period)
+    slipping = 0.5 + 0.25 * np.cos(rate * since) + speed / rate * np.sin(rate * since)
+    moved = high + speed * since - slipping
+    return np.where(times < high / speed, 0.0, cycles * jump + np.where(since < slip, moved, jump))
+
+
+# Cables
+
+
+def beads_tree(kind: str, count: int) -> dict[str, Any]:
+    """A folded chain, or a rope between two walls."""
+    if kind == "chain":
+        nodes = {
+            f"b{i}": [0.02 * (i > count / 2), 0, -0.05 * min(i, count - i)]
+            for i in range(count + 1)
+        }
+        law = {"stiffness": "2e3 N/m", "damping": "0.05 N*s/m", "free_length": "0.05 m"}
+        ends, gravity = ["b0"], f"{G} m/s^2"
+    else:
+        angles = np.pi * np.arange(count + 2) / (count + 1)
+        nodes = {f"b{i}": [0.025 * i, 0, 1e-4 * math.sin(a)] for i, a in enumerate(angles)}
+        law = {"stiffness": "1e4 N/m", "damping": "0 N*s/m", "free_length": "0.024 m"}
+        ends, gravity = ["b0", f"b{count + 1}"], "0 m/s^2"
+    names = [*nodes]
+    return {
+        "unit": "m",
+        "nodes": nodes,
+        "masses": {name: "10 g" for name in names if name not in ends},
+        "cables": {"link": law | {"pairs": [list(pair) for pair in itertools.pairwise(names)]}},
+        "anchors": dict.fromkeys(ends, "xyz"),
+        "gravity": gravity,
+        "start": {"rest": False},
+    }
+
+
+def on_cables(tree: Mapping[str, Any], masses: Sequence[float], node: str, times: Array) -> Array:
+    """Heights (times,) of a node where point masses hang on straight cables that only pull."""
+    names, (cables,) = [*tree["nodes"]], tree["cables"].values()
+    k, c, free = (number(cables[key]) for key in ("stiffness", "damping", "free_length"))
+    first, last = np.array([[names.index(x) for x in pair] for pair in cables["pairs"]]).T
+    start = np.array([tree["nodes"][name] for name in names], dtype=float)
+    held = np.isin(names, [*tree["anchors"]])
+    weight = number(tree.get("gravity", G))
+
+    def rate(_: float, y: Array) -> Array:
+        p, v = y.reshape(2, -1, 3)
+        apart = p[last] - p[first]
+        length = np.linalg.norm(apart, axis=1)
+        along = apart / length[:, None]
+        pull = k * np.maximum(length - free, 0.0)
+        damped = c * ((v[last] - v[first]) * along).sum(axis=1)
+        force = (pull + np.clip(damped, -pull, pull))[:, None] * along
+        total = np.zeros_like(p)
+        np.add.at(total, first, force)
+        np.add.at(total, last, -force)
+        acceleration = total / np.array(masses)[:, None] - [0.0, 0.0, weight]
+        acceleration[held] = 0.0
+        return np.concatenate([v.ravel(), acceleration.ravel()])
+
+    begin = np.append(start.ravel(), np.zeros(start.size))
+    y = solved(rate, begin, times, rtol=1e-9, atol=1e-11)
+    return y[3 * names.index(node) + 2]
+
+
+def chain(times: Array, case: Case) -> Array:
+    return on_cables(case["tree"], [0.01] * 21, "b20", times)
+
+
+def rope(times: Array, case: Case) -> Array:
+    rate = 2.0 * math.sqrt(10.0 / (0.01 * 0.025)) * math.sin(math.pi / 82)
+    return 1e-4 * math.sin(20 * math.pi / 41) * np.cos(rate * times)
+
+
+def tether(times: Array, case: Case) -> Array:
+    return on_cables(case["tree"], [1.0, 0.2], "p", times)
+
+
+def atwood(times: Array, case: Case) -> Array:
+    heavy, light, k = 0.2, 0.1, 1e3
+    square = k * (1.0 / heavy + 1.0 / light)
+    middle, before = 2.0 * G / square, light * G / k
+    stretch = middle + (before - middle) * np.cos(math.sqrt(square) * times)
+    moment = 0.5 * (heavy - light) * G * times**2
+    return -(moment + light * (stretch - before)) / (heavy + light)
+
+
+def bead(times: Array, case: Case) -> Array:
+    def rate(_: float, y: Array) -> list[float]:
+        half = math.hypot(0.2, y[0])
+        return [y[1], -2e3 * max(0.0, 2.0 * half - 0.38) * y[0] / half / 0.1]
+
+    return solved(rate, [0.06, 0.0], times)[0]
+
+
+def flyball(times: Array, case: Case) -> Array:
+    square, lever, mass = 0.3 / 3.0 + 5.0, 0.3 * 0.5 + 5.0, 3.0
+
+    def rate(_: float, y: Array) -> list[float]:
+        a, down, spin, a_rate, rate_down = y
+        s, c = math.sin(a), math.cos(a)
+        across, along = 0.5 * s, down - 0.5 * c
+        length = math.hypot(across, along)
+        by_a, by_down = (across * 0.5 * c + along * 0.5 * s) / length, along / length
+        pull = 8e5 * max(0.0, length - 0.5)
+        damped = 4e4 * (by_a * a_rate + by_down * rate_down)
+        force = 2.0 * (pull + min(max(damped, -pull), pull))
+        inertia = 0.01 + 2.0 * square * s * s
+        a_force = 2.0 * square * s * c * spin**2 - 2.0 * lever * G * s - force * by_a
+        turn = -4.0 * square * s * c * a_rate * spin / inertia
+        return [a_rate, rate_down, turn, a_force / (2.0 * square), G - force * by_down / mass]
+
+    start = [math.pi / 6, math.sqrt(0.75), 2.0 * math.pi, 0.0, 0.0]
+    return -solved(rate, start, times, method="Radau", rtol=1e-9, atol=1e-11)[1]
+
+
+# At rest: what the package finds, and the reference
+
+
+def at_rest(**tree: Any) -> EquilibriumStudy:
+    """A structure at rest. It has a slack cord besides, and no ground."""
+    given: dict[str, Any] = {"unit": "m", "gravity": 0, "struts": {}, "anchors": {}} | tree
+    given["struts"] = {k: BAR | {"density": "1200 kg/m^3"} | s for k, s in given["struts"].items()}
+    return study_equilibrium(robot_of_structure(StructureFile.from_tree(given, "made"), "made"))
+
+
+def truss() -> tuple[Array, Array, Array]:
+    whole, loads = math.hypot(1.0, 0.3), np.arange(0.0, 901.0, 180.0)
+
+    def missing(h: float, load: float) -> float:
+        return 2e5 * (whole / math.hypot(1.0, h) - 1.0) * h - load
+
+    expected = [brentq(missing, 0.175, 0.3, (load,), xtol=1e-14) for load in loads]
+    found = [
+        at_rest(
+            nodes={"l": [-1, 0, 0], "r": [1, 0, 0], "p": [0, 0, 0.3], "w": [0, 9, 0]},
+            struts={"bar": {"pairs": [["l", "p"], ["p", "r"]], "axial_stiffness": "1e5 N/m"}},
+            pinned=["p"],
+            cables={"cord": CORD | {"pairs": [["p", "w"]]}},
+            anchors={"l": "xyz", "r": "xyz", "p": "y", "w": "xyz"},
+            anchor_stiffness="1e10 N/m",
+            joint_stiffness="1e10 N/m",
+            loads={"p": [0, 0, f"{-load} N"]},
+        ).nodes.z["p"]
+        for load in loads.tolist()
+    ]
+    return loads, np.array(found), np.array(expected)
+
+
+def prism_of(count: int, twist: float, density: float, stiffness: float) -> EquilibriumStudy:
+    """A prism near its equilibrium, from the angle (rad) between its ends."""
+    around = 2.0 * math.pi * np.arange(count) / count
+    nodes = {f"a{i}": [math.cos(a), math.sin(a), 0.0] for i, a in enumerate(around)}
+    nodes |= {f"b{i}": [math.cos(a), math.sin(a), 1.0] for i, a in enumerate(around + twist)}
+    ring = [(i, (i + 1) % count) for i in range(count)]
+    pairs = {"a": [[f"a{i}", f"a{j}"] for i, j in ring], "b": [[f"b{i}", f"b{j}"] for i, j in ring]}
+    pairs["side"] = [[f"a{i}", f"b{i}"] for i in range(count)]
+    k = {"stiffness": f"{stiffness} N/m", "damping": "1 N*s/m"}
+    reach = 2.0 * math.sin(math.pi / count)
+    up = math.hypot(1.0, 2.0 * math.sin(0.5 * (math.pi / 2 - math.pi / count)))
+    per_length = {"a": density, "b": density, "side": density * reach}
+    lengths = {"a": reach, "b": reach, "side": up}
+    cables = {
+        name: k
+        | {"pairs": pairs[name], "free_length": f"{x * (1.0 - per_length[name] / stiffness)!r} m"}
+        for name, x in lengths.items()
+    }
+    struts = {"bar": {"pairs": [[f"a{i}", f"b{j}"] for i, j in ring]}}
+    return at_rest(nodes=nodes, struts=struts, cables=cables)
+
+
+def twist() -> tuple[Array, Array, Array]:
+    counts, found = np.arange(3, 9), []
+    for count in counts.tolist():
+        nodes = prism_of(count, math.pi / 2 - math.pi / count - 0.05, 10.0, 100.0).nodes
+        first, last = np.arctan2(nodes.y, nodes.x)[["a0", "b0"]]
+        found.append(math.degrees((last - first) % math.pi))
+    return counts, np.array(found), 90.0 - 180.0 / counts
+
+
+def prism_modes() -> tuple[Array, Array, Array]:
+    shares = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    found = [
+        prism_of(3, math.pi / 6, 10.0 * share, 1e6).frequencies[0] ** 2 for share in shares.tolist()
+    ]
+    return shares, np.array(found) / found[0], shares
+
+
+def rope_modes() -> tuple[Array, Array, Array]:
+    n, known = np.arange(1, 41), at_rest(**beads_tree("rope", 40)).frequencies
+    expected = math.sqrt(10.0 / (0.01 * 0.025)) * np.sin(n * math.pi / 82) / math.pi
+    return n, known[np.abs(known[:, None] - expected).argmin(axis=0)], expected
+
+
+def rings() -> tuple[Array, Array, Array]:
+    tau, fatigue, beta, found, expected = 0.05, 0.6, 2.5, [], []
+    for count in (2, 3, 5):
+        weights = np.zeros((count + count % 2,) * 2)
+        for i in range(count):
+            weights[i, (i - 1) % count] = 2.5
+        start = np.append(0.1 * np.arange(len(weights)), 0.0 * weights[0])
+        network = Network.of(weights, tau_a=tau, tau_b=fatigue, self_inhibition_weight=beta)
+        neurons = MatsuokaCpg(network, tonic=1.0, initial_state=start, gain=1.0)
+        simulator = Simulator(neurons)
+        ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3).set_target_accuracy(1e-9)
+        times, states = np.arange(0.0, 20.0, 0.005), []
+        for time in times.tolist():
+            simulator.AdvanceTo(time)
+            states.append(simulator.get_context().get_continuous_state_vector().CopyToVector()[0])
+
+        def rate(_: float, y: Array, weights: Array = weights) -> Array:
+            u, v = y.reshape(2, -1)
+            y = np.maximum(u, 0.0)
+            return np.append((1.0 - u - beta * v - weights @ y) / tau, (y - v) / fatigue)
+
+        found.append(period(times, np.array(states)))
+        expected.append(period(times, solved(rate, start, times, max_step=1e-2)[0]))
+    return np.array([2, 3, 5]), np.array(found), np.array(expected)
+
+
+def period(times: Array, values: Array) -> float:
+    """Mean time between upward crossings of the mean, in the second half."""
+    late = times > 0.5 * times[-1]
+    curve = CubicSpline(times[late], values[late] - values[late].mean())
+    roots = curve.roots(extrapolate=False)
+    return float(np.diff(roots[curve(roots, 1) > 0.0]).mean())

@@ -1,0 +1,50 @@
+"""The page of problems whose motion is known: its numbers, and its errors."""
+
+import json
+
+import numpy as np
+import pytest
+import verification
+
+RESULTS = json.loads((verification.HERE / verification.RESULTS).read_text("utf-8"))
+FAMILIES = {problem["family"] for problem in verification.PROBLEMS.values()}
+LEAST = 1e-10
+"""Errors below this are of rounding."""
+
+
+def check(name: str, engine: str) -> None:
+    """The error at the engine's defaults is at most three times what is written."""
+    known = RESULTS[name]["engines"][engine]["error"]
+    if engine == "all":
+        error = verification.verified(name)["engines"]["all"]["error"]
+    else:
+        found = verification.run(verification.completed(name), verification.ENGINES[engine][0])
+        error = np.abs(found["found"] - found["expected"]).max() / RESULTS[name]["size"]
+    assert error <= max(3.0 * known, LEAST), (name, engine)
+
+
+def test_the_page_has_every_problem_with_its_engines_or_a_reason():
+    page = (verification.HERE / "README.md").read_text("utf-8")
+    assert {*RESULTS} == {*verification.PROBLEMS}
+    for name, problem in verification.PROBLEMS.items():
+        assert f"**{problem['title']}**" in page
+        told = {*RESULTS[name]["engines"]} | {*problem.get("lacks", {})}
+        assert told in ({"all"}, {*verification.ENGINES})
+
+
+@pytest.mark.parametrize(("name", "engine"), [("bead", "compiled"), ("prism_modes", "all")])
+def test_an_error_is_as_on_the_page(name, engine):
+    check(name, engine)
+
+
+def test_the_engines_have_the_orders_of_their_methods():
+    orders = {name: numbers["order"] for name, numbers in RESULTS["brick"]["engines"].items()}
+    assert orders == pytest.approx({"compiled": 2.0, "drake": 3.0, "mujoco": 1.0}, abs=0.15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_errors_of_a_family_are_as_on_the_page(family):
+    for name, problem in verification.PROBLEMS.items():
+        for engine in RESULTS[name]["engines"] if problem["family"] == family else ():
+            check(name, engine)
