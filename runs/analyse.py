@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pandas
+from script import read_record, run_script
 
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
@@ -28,7 +28,7 @@ from tetra_drake.files import json_number, write_whole
 from tetra_drake.lab.study.robustness import PERCENT, by_gait, robustness
 from tetra_drake.lab.study.statistics import json_rows
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.laws.terrain import Flat, Rough
+from tetra_drake.laws.terrain import Rough
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.results.result import SimulationResult
@@ -36,7 +36,6 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.engine_kinds import Drake
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import looks_for_turns, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH
@@ -48,8 +47,6 @@ TIGHT, MUJOCO = "runge_kutta3, witness", "MuJoCo"
 """Settings with other engines: the Drake diagram in steps of about 0.15 ms, with mode changes
 localised by witness functions; and MuJoCo, with a coefficient of friction of 0.5 in place of the
 reset integrator."""
-LAWS = {"reset integrator": "thesis", "Coulomb": "coulomb"}
-"""Settings on flat ground with the compiled engine and the friction of another shipped scenario."""
 
 UNSEEN = range(1001, 1021)
 """Seeds of random ground that were not used in evolution."""
@@ -81,21 +78,13 @@ SPEED = "relative_speed"
 DRAWN = ("5 %", "95 %")
 """Quantiles of a gait's distances in draws of disturbances that pages show."""
 
+_FOUND = ("trial", "evaluation", "evaluations", "fitness")
 _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
 _COLUMNS = {
-    "best_gaits": (
-        "trial",
-        "evaluation",
-        "evaluations",
-        "fitness",
-        *SHOWN,
-        SPEED,
-        "sensitivity_in",
-        TURNED,
-    ),
-    "resimulations": ("trial", "setting", "distance_in", TURNED),
-    "unseen": ("trial", "seed", "distance_in", "met"),
-    "disturbed": ("gait", "undisturbed", *DRAWN, *_MEAN, *_KEPT, "failed", "missed"),
+    "best_gaits": [*_FOUND, *SHOWN, SPEED, "sensitivity_in", TURNED],
+    "resimulations": ["trial", "setting", "distance_in", TURNED],
+    "unseen": ["trial", "seed", "distance_in", "met"],
+    "disturbed": ["gait", "undisturbed", *DRAWN, *_MEAN, *_KEPT, "failed", "missed"],
 }
 _NUMBERS = [*SHOWN, SPEED, "sensitivity_in", "distance_in", TURNED]
 """Columns with numbers that may all be null."""
@@ -139,27 +128,23 @@ class Analysis:
 
 def load_analysis(directory: Path) -> Analysis:
     """Reads analysis.json of a run. Raises InputError if it is missing or damaged."""
-    path = directory / ANALYSIS
-    try:
-        raw: Any = json.loads(path.read_text(encoding="utf-8"))
-        frames = {}
-        for key, names in _COLUMNS.items():
-            # Without rows there are no columns either.
-            rows = [{TURNED: None} | row for row in raw[key]]
-            frames[key] = pandas.DataFrame(rows, columns=None if rows else list(names))
-            frames[key] = frames[key][list(names)]
-        for frame in frames.values():
-            numbers = frame.columns.intersection(_NUMBERS)
-            frame[numbers] = frame[numbers].astype(float)
-        return Analysis(
-            best_gaits=frames["best_gaits"].set_index("trial"),
-            resimulations=frames["resimulations"],
-            unseen=frames["unseen"],
-            disturbed=frames["disturbed"].set_index("gait"),
-        )
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        problem = f"cannot be read ({error}); run `python runs/analyse.py {directory}`"
-        raise InputError(path, "", problem) from error
+    return read_record(directory / ANALYSIS, analysis_of, f"analyse.py {directory}")
+
+
+def analysis_of(content: Mapping[str, Any]) -> Analysis:
+    """Analysis of the content of analysis.json."""
+    frames = {}
+    for key, names in _COLUMNS.items():
+        given = ({TURNED: None} | row for row in content[key])
+        rows = [{name: row[name] for name in names} for row in given]
+        frame = pandas.DataFrame(rows, columns=names)
+        frames[key] = frame.astype({name: float for name in names if name in _NUMBERS})
+    return Analysis(
+        best_gaits=frames["best_gaits"].set_index("trial"),
+        resimulations=frames["resimulations"],
+        unseen=frames["unseen"],
+        disturbed=frames["disturbed"].set_index("gait"),
+    )
 
 
 def analyse(directory: Path, *, workers: int, executor: MakeExecutor | None = None) -> None:
@@ -215,19 +200,22 @@ def sensitivity(scenario: Scenario, gaits: Sequence[Gait], workers: int) -> list
     directions[:, :, 2] = np.abs(directions[:, :, 2])  # not into the ground
     starts = [Draw({}), *(Draw({}, moves=DISPLACEMENT * each) for each in directions)]
     compiled = scenario.on_engine("compiled")
-    scenarios = [disturbed(compiled, start) for start in starts]
-    outcomes = simulate_many(
-        scenarios * len(gaits), [gait for gait in gaits for _ in scenarios], workers=workers
-    )
-    distances = np.array(
-        [
-            outcome.metrics.distance_in if isinstance(outcome, SimulationResult) else math.nan
-            for outcome in outcomes
-        ]
-    )
-    undisplaced, *displaced = distances.reshape(len(gaits), len(scenarios)).T
+    walks = outcomes([disturbed(compiled, start) for start in starts], gaits, workers)
+    undisplaced, *displaced = np.array(
+        [[math.nan if each is None else each.metrics.distance_in for each in of] for of in walks]
+    ).T
     largest: list[float] = np.abs(displaced - undisplaced).max(axis=0).tolist()
     return largest
+
+
+def outcomes(
+    scenarios: Sequence[Scenario], gaits: Sequence[Gait], workers: int
+) -> list[list[SimulationResult | None]]:
+    """Results of each gait on all scenarios; None if a simulation failed."""
+    every = [gait for gait in gaits for _ in scenarios]
+    found = simulate_many([*scenarios] * len(gaits), every, workers=workers)
+    results = [each if isinstance(each, SimulationResult) else None for each in found]
+    return [results[i : i + len(scenarios)] for i in range(0, len(results), len(scenarios))]
 
 
 def resimulate(
@@ -260,20 +248,15 @@ def on_unseen_ground(
     ground is not random."""
     if not isinstance(scenario.terrain, Rough):
         return []
-    walks = [(trial, seed) for trial in gaits for seed in UNSEEN]
-    scenarios = {seed: scenario.with_changes({"terrain.seed": seed}) for seed in UNSEEN}
-    outcomes = simulate_many(
-        [scenarios[seed] for _, seed in walks],
-        [gaits[trial] for trial, _ in walks],
-        workers=workers,
-    )
     rows = []
-    for (trial, seed), outcome in zip(walks, outcomes, strict=True):
-        distance, met = None, False
-        if isinstance(outcome, SimulationResult):
-            distance = outcome.metrics.distance_in
-            met = not unmet_requirements(outcome.metrics, scenario.require)
-        rows.append({"trial": trial, "seed": seed, "distance_in": distance, "met": met})
+    scenarios = [scenario.with_changes({"terrain.seed": seed}) for seed in UNSEEN]
+    for trial, walks in zip(gaits, outcomes(scenarios, [*gaits.values()], workers), strict=True):
+        for seed, walk in zip(UNSEEN, walks, strict=True):
+            row: dict[str, Any] = {"trial": trial, "seed": seed, "distance_in": None, "met": False}
+            if walk is not None:
+                met = not unmet_requirements(walk.metrics, scenario.require)
+                row |= {"distance_in": walk.metrics.distance_in, "met": met}
+            rows.append(row)
     return rows
 
 
@@ -283,13 +266,6 @@ def settings_of(scenario: Scenario) -> dict[str, Scenario]:
     changes: dict[str, dict[str, Any]] = {TIGHT: {"engine": tight}, MUJOCO: {"engine": "!Mujoco"}}
     if isinstance(scenario.friction, Coulomb):
         changes[MUJOCO]["friction.stiffness"] = "0 N/m"  # MuJoCo has no bristles
-    if isinstance(scenario.terrain, Flat):
-        for law, shipped in LAWS.items():
-            other = load_scenario(shipped)
-            changes[law] = {
-                "friction": other.friction,
-                "engine": other.on_engine("compiled").engine,
-            }
     settings = {}
     for name, change in changes.items():
         with contextlib.suppress(InputError):
@@ -306,7 +282,4 @@ def main(arguments: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"analyse.py: {error}")
+    run_script(main)

@@ -11,9 +11,12 @@ interrupted script continues. Then the script writes the page README.md from the
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import functools
+import hashlib
 import importlib.util
 import math
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -27,9 +30,10 @@ from matplotlib.figure import Figure
 from page import rendered
 from records import append, read
 
+from tetra_drake.cli import INTERRUPTED
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import read_text, write_whole
@@ -144,8 +148,18 @@ class Problem:
         self.task, self.scenario, self._queue = task, task.scenario, queue
         self.space = ParameterSpace.of(self.scenario)
         self._duration = self.scenario.simulation.duration
-        self.left = self.budget = episodes * self._duration
+        self._left = self._budget = episodes * self._duration
         self._evaluation = GaitEvaluation(self.scenario, SCORES[task.score])
+
+    @property
+    def left(self) -> float:
+        """Budget that is left, in simulated seconds."""
+        return self._left
+
+    @property
+    def spent(self) -> float:
+        """Simulated seconds that are used."""
+        return self._budget - self._left
 
     def evaluate(self, vectors: Sequence[Vector]) -> list[Evaluation]:
         """Evaluations of parameter vectors, one episode each. `fitness` is the score; -inf for a
@@ -161,7 +175,7 @@ class Problem:
         if not 0.0 <= seconds <= self.left + 1e-6:
             problem = f"found {seconds:g} simulated seconds, expected at most {self.left:g}"
             raise InputError("bench", self.task.name, problem)
-        self.left -= seconds
+        self._left -= seconds
 
     def search(self, kind: OptimizerKind, seed: int) -> Vector:
         """The best vector that an optimiser of the package finds with the whole budget. A search
@@ -189,18 +203,23 @@ class Entry:
     solve: Callable[[Problem, int], Solution]
     tasks: Sequence[str]
     """Names of the tasks that it can solve."""
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    """Changes of the tasks' scenarios, such as another kind of oscillators."""
+    digest: str = ""
+    """Digest of the file, in the records of an entry that is not shipped."""
 
     @classmethod
     def of(cls, file: Path) -> Entry:
-        """The entry in a Python file: its function `solve`, its docstring, and a list TASKS if it
-        solves some tasks only. Raises InputError if it cannot be imported or has no `solve`."""
+        """The entry in a Python file: its function `solve`, its docstring, a list TASKS if it
+        solves some tasks only, and CHANGES of their scenarios if it needs any. Raises InputError if
+        it cannot be imported or has no `solve`."""
         spec = importlib.util.spec_from_file_location(f"entry_{file.stem}", file)
         if not file.is_file() or spec is None or spec.loader is None:
             raise InputError(file, "", "is no Python file")
         module = importlib.util.module_from_spec(spec)
         try:
             spec.loader.exec_module(module)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             problem = f"cannot be imported: {type(error).__name__}: {error}"
             raise InputError(file, "", problem) from error
         solve = getattr(module, "solve", None)
@@ -209,11 +228,17 @@ class Entry:
             raise InputError(file, "solve", problem)
         names = [task.name for task in TASKS]
         tasks = getattr(module, "TASKS", names)
-        if unknown := set(tasks) - set(names):
+        check_type(file, "TASKS", tasks, list, tuple)
+        if unknown := set(map(str, tasks)) - set(names):
             problem = f"found {sorted(unknown)[0]!r}, expected some of {', '.join(names)}"
             raise InputError(file, "TASKS", problem)
         about = (module.__doc__ or file.stem).strip().split("\n")[0].rstrip(".")
-        return cls(file.stem, about, solve, tasks)
+        changes = getattr(module, "CHANGES", {})
+        digest = hashlib.sha256(file.read_bytes()).hexdigest()[:12]
+        is_shipped = file.resolve().parent == ENTRIES.resolve()
+        if not is_shipped and (ENTRIES / file.name).exists():
+            raise InputError(file, "", "has the name of a shipped entry, expected another")
+        return cls(file.stem, about, solve, tasks, changes, "" if is_shipped else digest)
 
 
 def solved(
@@ -222,9 +247,16 @@ def solved(
     """Records of an entry's solutions to a task, one for each seed. The seeds are solved side by
     side. Raises InputError if the entry raises an error or returns something else."""
     started = time.perf_counter()
+    task = dataclasses.replace(task, changes={**task.changes, **entry.changes})
     with ThreadPoolExecutor(len(seeds)) as threads, SimulationQueue(available_cores()) as queue:
         problems = [Problem(task, queue, episodes=episodes) for _ in seeds]
-        found = list(threads.map(entry.solve, problems, seeds))
+        try:
+            found = list(threads.map(entry.solve, problems, seeds))
+        except InputError:
+            raise
+        except (Exception, SystemExit) as error:
+            problem = f"raised {type(error).__name__}: {error}"
+            raise InputError(entry.name, "solve", problem) from error
     solutions = [_checked(one, problems[0], entry) for one in found]
     wall_time = (time.perf_counter() - started) / len(seeds)
     records: list[Record] = []
@@ -238,7 +270,9 @@ def solved(
         if not callable(solution):
             record["parameters"] = solution.tolist()
         record["score"] = round(task.scored(solution), DECIMALS)
-        record["simulated_s"] = round(problem.budget - problem.left, 3)
+        record["simulated_s"] = round(problem.spent, 3)
+        if entry.digest:
+            record["digest"] = entry.digest
         record["wall_s"] = round(wall_time, 2)
         records.append(record)
     best = max(range(len(records)), key=lambda place: records[place]["score"])
@@ -363,7 +397,12 @@ def main() -> None:
     arguments = parser.parse_args()
     files = arguments.entries or sorted(ENTRIES.glob("*.py"))
     entries = [] if arguments.page else [Entry.of(file) for file in files]
-    done = {(one["task"], one["entry"], one["seed"]) for one in read(HERE / RECORDS)}
+    known = read(HERE / RECORDS)
+    done = {(one["task"], one["entry"], one["seed"]) for one in known}
+    for entry in entries:
+        if {one.get("digest", "") for one in known if one["entry"] == entry.name} - {entry.digest}:
+            problem = f"{RECORDS} has records of another entry of this name; rename it"
+            raise InputError(entry.name, "", problem)
     for task in TASKS:
         for entry in entries:
             seeds = [seed for seed in range(SEEDS) if (task.name, entry.name, seed) not in done]
@@ -382,5 +421,10 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    with heeding_interrupts():
-        main()
+    try:
+        with heeding_interrupts():
+            main()
+    except InputError as refused:
+        sys.exit(f"bench: {refused}")
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)

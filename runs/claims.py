@@ -11,11 +11,9 @@ the criterion in the table, and does not hold if at most 10 % do.
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
-import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +21,13 @@ import numpy as np
 import xarray
 from page import rendered
 from scipy.spatial.transform import Rotation
+from script import evolved, read_record, run_script
 from settle import difference_of_means
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError
-from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.experiment import evolve
-from tetra_drake.files import check_file, read_json, write_whole
+from tetra_drake.files import check_file, write_whole
 from tetra_drake.formatting import TextTable, fixed, listed, ranged
-from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.laws.curves import travelling_index
 from tetra_drake.machine import versions
 from tetra_drake.robot.gait import Gait
@@ -200,10 +195,8 @@ def of_initial(run: Run, gait: Gait) -> dict[str, Any]:
 def by_friction(coulomb: Run, factor: int) -> dict[str, Any]:
     """Distances (in) with a factor on friction against slip backward: of the fittest gaits of new
     trials, and of the fittest gaits of a run."""
-    out, changes = SCRATCH / f"backward_{factor}", {"friction.backward": factor}
-    scenario, resume = coulomb.scenario.with_changes(changes | TRIALS), (out / MANIFEST).exists()
-    run = evolve(scenario, out, resume=resume, reevaluate=False, report=False)
-    scenario = coulomb.scenario.with_changes(changes)
+    scenario = coulomb.scenario.with_changes({"friction.backward": factor})
+    run = evolved(scenario.with_changes(TRIALS), SCRATCH / f"backward_{factor}")
     again = [simulate(scenario, gait).metrics.distance_in for gait in coulomb.gaits()]
     return {"factor": factor, "evolved": run.best()["distance_in"], "replayed": again}
 
@@ -227,17 +220,6 @@ def make_record() -> dict[str, Any]:
         "initial": columns(of_initial(run, gait) for gait in gaits) | {"aside": aside[1].tolist()},
         "friction": columns(by_friction(coulomb, factor) for factor in FACTORS),
     }
-
-
-def load_motion(path: Path = MOTION) -> dict[str, Any]:
-    """Reads the record. Raises InputError if it is missing or damaged."""
-    record: dict[str, Any] = read_json(path, "record; run `python runs/claims.py`")
-    try:
-        claims(record)
-    except (InputError, AttributeError, LookupError, TypeError, ValueError) as error:
-        problem = f"cannot be read ({error!r}); run `python runs/claims.py`"
-        raise InputError(path, "", problem) from error
-    return record
 
 
 # The table
@@ -284,19 +266,12 @@ def claims(record: Mapping[str, Any]) -> TextTable:
     return TextTable(headings, [line.split(" | ") for line in text.splitlines()], range(4))
 
 
-def main() -> None:
+def main(_: Sequence[str] = ()) -> None:
     """Writes the record and prints the table."""
     check_file(MOTION)
     write_whole(MOTION, json.dumps(make_record(), indent=1, allow_nan=False) + "\n")
-    print(claims(load_motion()).markdown())
+    print(read_record(MOTION, claims, "claims.py").markdown())
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    try:
-        with heeding_interrupts():
-            main()
-    except InputError as error:
-        sys.exit(f"claims.py: {error}")
-    except KeyboardInterrupt:
-        sys.exit("claims.py: interrupted; the same command goes on")
+    run_script(main)

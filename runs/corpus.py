@@ -16,13 +16,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from page import rendered
+from script import read_settings, run_script
 
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import InputError, SimulationFailure
@@ -37,7 +38,6 @@ from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure
-from tetra_drake.scenario.yaml_text import parse_yaml
 
 FOLDER = Path(__file__).parents[1] / "tests" / "data" / "corpus"
 MEASURED, KNOWN, PAGE = FOLDER / "measured.json", FOLDER / "known.yaml", FOLDER / "README.md"
@@ -92,43 +92,42 @@ def quantity(study: EquilibriumStudy, what: str) -> float:
 
 def _value(study: EquilibriumStudy, kind: str, named: list[str]) -> float:
     """A number of a kind. `named` are a group of cables, or the one or two nodes that it is of."""
-    states, mechanisms = len(study.statics.self_stresses), study.statics.mechanisms
     if kind in ("tension", "length"):
         return float(study.cables.loc[study.cables["group"] == named[0], kind].mean())
-    if kind in ("height", "distance", "twist"):
-        p_WN = study.nodes.loc[named, ["x", "y", "z"]].to_numpy()
-        if kind == "height":
-            return float(p_WN[0, 2])
-        if kind == "distance":
-            return float(np.linalg.norm(p_WN[1] - p_WN[0]))
-        centre = study.nodes[["x", "y"]].to_numpy().mean(axis=0)
-        first, second = np.arctan2(*(p_WN[:, :2] - centre).T[::-1])
-        return float(abs((np.degrees(second - first) + 180.0) % 360.0 - 180.0))
-    return float(
-        {
-            "states": states,
-            "mechanisms": mechanisms,
-            "states-mechanisms": states - mechanisms,
-            "mass": study.robot.structure.mass.sum(),
-            "load": study.nodes["load"].sum(),
-            "frequency": study.frequencies.min(initial=np.inf),
-        }[kind]
-    )
+    if not named:
+        return totals(study)[kind]
+    p_WN = study.nodes.loc[named, ["x", "y", "z"]].to_numpy()
+    if kind == "height":
+        return float(p_WN[0, 2])
+    if kind == "distance":
+        return float(np.linalg.norm(p_WN[1] - p_WN[0]))
+    assert kind == "twist", kind
+    centre = study.nodes[["x", "y"]].to_numpy().mean(axis=0)
+    first, second = np.arctan2(*(p_WN[:, :2] - centre).T[::-1])
+    return float(abs((np.degrees(second - first) + 180.0) % 360.0 - 180.0))
+
+
+def totals(study: EquilibriumStudy) -> dict[str, float]:
+    """Numbers of a whole structure by name."""
+    structure, statics = study.robot.structure, study.statics
+    states, mechanisms = len(statics.self_stresses), statics.mechanisms
+    return {
+        "bodies": len(structure.bodies),
+        "cables": len(structure.cables),
+        "states": states,
+        "mechanisms": mechanisms,
+        "states-mechanisms": states - mechanisms,
+        "mass": float(structure.mass.sum()),
+        "load": float(study.nodes["load"].sum()),
+        "frequency": float(study.frequencies.min(initial=np.inf)),
+    }
 
 
 def measured(name: str) -> dict[str, Any]:
     """Numbers of a structure: statics, known quantities as found here, rest on each engine."""
     study = study_equilibrium(robot_of(name))
-    structure = study.robot.structure
-    row: dict[str, Any] = {
-        "bodies": len(structure.bodies),
-        "cables": len(structure.cables),
-        "states": len(study.statics.self_stresses),
-        "mechanisms": study.statics.mechanisms,
-        "mass": float(structure.mass.sum()),
-        "frequency": quantity(study, "frequency"),
-    }
-    known = parse_yaml(KNOWN.read_text(encoding="utf-8"), KNOWN).get(name, {})
+    row: dict[str, Any] = {**totals(study)}
+    known = read_settings(KNOWN).get(name, {})
     row["known"] = [[what, to, quantity(study, what), by] for what, (to, by) in known.items()]
     for engine in ENGINES:
         try:
@@ -178,7 +177,7 @@ def csv(table: pd.DataFrame) -> str:
     return table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
 
 
-def main(chosen: list[str]) -> None:
+def main(chosen: Sequence[str]) -> None:
     """Measures structures and writes the page after each."""
     rows = json.loads(MEASURED.read_text(encoding="utf-8")) if MEASURED.exists() else {}
     rows = {name: row for name, row in rows.items() if name in names()}
@@ -193,7 +192,4 @@ def main(chosen: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"corpus.py: {error}")
+    run_script(main)

@@ -9,7 +9,6 @@ animals, Nature 521, 2015).
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import functools
 import math
@@ -24,6 +23,7 @@ import pandas
 from matplotlib.figure import Figure
 from page import rendered
 from records import append, read
+from script import read_settings, run_script
 
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.evolution.run import load_run
@@ -45,40 +45,8 @@ GAITS, CANDIDATES = HERE / "gaits.jsonl", HERE / "whole.jsonl"
 WALKS, PLANS = HERE / "walks.jsonl", HERE / "plans.jsonl"
 """Records: walks of damaged robots; walks by a planner."""
 
-SEEDS, PERCENT = 5, 5.0
-"""Number of disturbed robots, and the size of their disturbances in percent."""
-TRIALS = 10
-"""Largest number of gaits that a damaged robot tries."""
-TURNS = (0.0, -0.06, 0.06, -0.03, 0.03)
-"""Turns with which each gait can be tried."""
-STRENGTHS = (1.0, 1.5)
-"""Strengths with which each gait can be tried: the motors' tensions, as shares of the usual ones.
-Only the first one is in use before the damage."""
-CELLS, SLOWEST = 4, 0.03
-"""Number of cells of the map along each body's share of time in the air, and the least speed (body
-lengths/s) of a gait of the map."""
-MOST_TURN = math.radians(180.0)
-"""Change of heading at which the scale of the map ends."""
-REACH, NOISE, BOLD, ENOUGH = 0.2, 1e-3, 0.05, 0.9
-"""Settings of Cully et al.: reach of a trial on the map, variance of a trial, weight of the unknown
-in the choice, and the share of the best expected speed at which trials end."""
-BATCH = 24
-"""Number of walks that are simulated side by side, and recorded together."""
-GOAL = 0.8
-"""Share of its speed that the robot should have back."""
-
-PLANNED = {"simulation.duration": "8 s", "simulation.steady_from": "2 s"}
-"""Changes of the scenario for walks by a planner, which need much work."""
-PLANNER: dict[str, Any] = {
-    "samples": 100,
-    "horizon": 1.0,
-    "knots": 10,
-    "temperature": 0.1,
-    "noise": 0.5,
-    "control_period": 0.05,
-    "decision_period": 0.25,
-}
-
+SET: dict[str, Any] = read_settings(HERE / "settings.yaml")
+"""What is done, see the file."""
 DECIMALS = 4
 """Decimals of the numbers in the records."""
 
@@ -106,41 +74,34 @@ class Trial:
 @functools.cache
 def scenario() -> Scenario:
     """Scenario of the robot. Each motor has an oscillator, so that it can be steered."""
-    each = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]], "name": "damage"}
-    return load_run(WALKER).scenario.with_changes(each)
+    return load_run(WALKER).scenario.with_changes(SET["robot"])
 
 
-@functools.cache
-def sources() -> dict[str, str | None]:
-    """For each parameter of a gait of eight oscillators, the one of four oscillators that it is;
-    None for weights between left and right, which do not inhibit each other."""
-    found: dict[str, str | None] = {}
-    for name in scenario().parameters:
-        if not name.startswith("weight"):
-            found[name] = name
-            continue
-        _, pair, kind = name.split(" ")
-        start, end = (int(number) - 1 for number in pair.split("->"))
-        of_link = f"weight {start // 2 + 1}->{end // 2 + 1} {kind}"
-        found[name] = of_link if start % 2 == end % 2 else None
-    return found
+def source(name: str) -> str:
+    """The parameter of a gait of four oscillators that a parameter of eight is; empty for weights
+    between left and right, which do not inhibit each other."""
+    if not name.startswith("weight"):
+        return name
+    _, pair, kind = name.split(" ")
+    start, end = (int(number) - 1 for number in pair.split("->"))
+    return f"weight {start // 2 + 1}->{end // 2 + 1} {kind}" if start % 2 == end % 2 else ""
 
 
 def steered(gait: Gait, turn: float) -> Gait:
     """A gait of four oscillators for eight: left and right ones do the same, and the turn makes one
     side stronger."""
-    known = sources().items()
-    values = {name: gait.parameters[source] if source else 0.0 for name, source in known}
+    known = {"": 0.0, **gait.parameters}
+    values = {name: known[source(name)] for name in scenario().parameters}
     return dataclasses.replace(gait, parameters=values, turn=turn)
 
 
 def fastest_of_cells() -> list[Gait]:
     """The fastest gait of each cell of the map, among all that were evaluated for it."""
     run, fastest = load_run(MAP), dict[tuple[int, ...], Gait]()
-    rows = run.evaluations.query("relative_speed >= @SLOWEST")
+    rows = run.evaluations[run.evaluations["relative_speed"] >= SET["slowest"]]
     shares = rows.filter(like="lifted_T")
     for number in rows["relative_speed"].to_numpy().argsort()[::-1].tolist():
-        cell = tuple((CELLS * shares.iloc[number]).astype(int))
+        cell = tuple((SET["cells"] * shares.iloc[number]).astype(int))
         if cell not in fastest:
             key = rows.iloc[number][["trial", "index"]].astype(int)
             fastest[cell] = run.gait(*key)
@@ -156,18 +117,20 @@ def find_gaits() -> None:
 
 
 def possible_trials() -> list[Trial]:
-    """All recorded gaits with all TURNS and STRENGTHS. The first one is the robot's before the
+    """All recorded gaits with all turns and strengths. The first one is the robot's before the
     damage."""
     known = [Gait(**row) for row in read(GAITS)]
-    gaits = [steered(gait, turn) for gait in known for turn in TURNS]
-    return [Trial(gait, strength) for strength in STRENGTHS for gait in gaits]
+    gaits = [steered(gait, turn) for gait in known for turn in SET["turns"]]
+    return [Trial(gait, strength) for strength in SET["strengths"] for gait in gaits]
 
 
 @functools.cache
 def robots() -> list[Scenario]:
     """The disturbed robots."""
-    drawn = scenario().with_changes({"disturbances": default_disturbances(scenario(), PERCENT)})
-    return [disturbed(drawn, draw) for draw in fresh_draws(drawn, 0, SEEDS)]
+    drawn = scenario().with_changes(
+        {"disturbances": default_disturbances(scenario(), SET["percent"])}
+    )
+    return [disturbed(drawn, draw) for draw in fresh_draws(drawn, 0, SET["seeds"])]
 
 
 def speed_of(result: SimulationResult | Exception) -> Row:
@@ -186,23 +149,20 @@ def place_of(result: SimulationResult | Exception) -> Row:
     return {"lifted_shares": shares, "heading_change": round(metrics.heading_change, DECIMALS)}
 
 
-# Records
-
-
 # Trial and error
 
 
 def describe(rows: Sequence[Row]) -> np.ndarray:
     """Places (gaits, 6) on the map: shares of time in the air of the five bodies, and change of
-    heading as a share of MOST_TURN, of the whole robot."""
+    heading as a share of the scale, of the whole robot."""
     shares = np.array([row["lifted_shares"] for row in rows])
-    heading = np.array([row["heading_change"] for row in rows]) / MOST_TURN
+    heading = np.array([row["heading_change"] for row in rows]) / math.radians(SET["most_turn"])
     return np.column_stack([shares, np.clip(heading, -1.0, 1.0)])
 
 
 def likeness(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Matérn 5/2 kernel of places on the map, (n, 6) and (m, 6): a matrix (n, m)."""
-    away = np.linalg.norm(one[:, np.newaxis] - other, axis=2) * math.sqrt(5.0) / REACH
+    away = np.linalg.norm(one[:, np.newaxis] - other, axis=2) * math.sqrt(5.0) / SET["reach"]
     return (1.0 + away + away**2 / 3.0) * np.exp(-away)
 
 
@@ -215,10 +175,9 @@ def expected(
     """
     known = places[list(tried)]
     lost = np.array(speeds) - before[list(tried)]
-    shares = np.linalg.solve(
-        likeness(known, known) + NOISE * np.eye(len(known)), likeness(known, places)
-    )
-    spread = 1.0 - (likeness(known, places) * shares).sum(axis=0)
+    near, noise = likeness(known, places), SET["noise"] * np.eye(len(known))
+    shares = np.linalg.solve(likeness(known, known) + noise, near)
+    spread = 1.0 - (near * shares).sum(axis=0)
     return before + lost @ shares, np.sqrt(np.maximum(spread, 0.0))
 
 
@@ -228,16 +187,16 @@ def next_trial(
     """Number of the gait to try next; None if the best one so far is good enough."""
     mean, spread = expected(places, before, tried, speeds)
     hoped = np.where(np.isin(np.arange(len(mean)), tried), -math.inf, mean)
-    if len(tried) > TRIALS or max(speeds) >= ENOUGH * hoped.max():
+    if len(tried) > SET["trials"] or max(speeds) >= SET["enough"] * hoped.max():
         return None
-    return int(np.argmax(hoped + BOLD * spread))
+    return int(np.argmax(hoped + SET["bold"] * spread))
 
 
 def find_candidates() -> None:
     """Records the walks of the gaits to try, on the whole and undisturbed robot."""
-    known, done = possible_trials(), len(read(CANDIDATES))
-    for first in range(done, len(known), BATCH):
-        some = known[first : first + BATCH]
+    known, batch = possible_trials(), SET["batch"]
+    for first in range(len(read(CANDIDATES)), len(known), batch):
+        some = known[first : first + batch]
         robots = [trial.on(scenario()) for trial in some]
         results = simulate_many(robots, [trial.gait for trial in some])
         append(CANDIDATES, [speed_of(each) | place_of(each) for each in results])
@@ -294,12 +253,14 @@ def plans() -> None:
         if cable in done:
             continue
         before, *_ = possible_trials()
-        robot = before.on(scenario(), cable).with_changes(PLANNED)
-        planner = Planner(robot, {"v_WN": [-1.0, 0.0, 0.0]}, **PLANNER)
+        robot = before.on(scenario(), cable).with_changes(SET["planned"])
+        planner = Planner(robot, {"v_WN": [-1.0, 0.0, 0.0]}, **SET["planner"])
         if cable:
             planner.model.damage(0, cables=[cable])
         begin = time.process_time()
-        result = simulate(robot, controller=planner, control_period=PLANNER["control_period"])
+        result = simulate(
+            robot, controller=planner, control_period=SET["planner"]["control_period"]
+        )
         work = (time.process_time() - begin) / planner.decisions
         append(PLANS, [{"cable": cable, **speed_of(result), "cpu_s": work}])
         print(f"planner: {len(read(PLANS))} walks", flush=True)
@@ -326,7 +287,7 @@ def outcomes(walks: Sequence[Row]) -> pandas.DataFrame:
         best = np.maximum.accumulate(own["speed"].to_numpy() / before)
         row = {"seed": seed, "cable": cable, "group": group(cable), "trials": len(own) - 1}
         row |= {"lost": best[0], "found": best[-1], "of_best": best[-1] * before / fastest}
-        later = {f"best{k}": best[min(k, len(best) - 1)] for k in range(TRIALS + 1)}
+        later = {f"best{k}": best[min(k, len(best) - 1)] for k in range(SET["trials"] + 1)}
         rows.append(row | later)
     return pandas.DataFrame(rows)
 
@@ -342,7 +303,7 @@ def planned(rows: Sequence[Row]) -> pandas.DataFrame:
 
 def by_cable(shares: pandas.DataFrame, plans: pandas.DataFrame) -> pandas.DataFrame:
     """Numbers of each cable, left and right ones together."""
-    table = shares.assign(back=shares["found"] >= GOAL).groupby("group", sort=False)
+    table = shares.assign(back=shares["found"] >= SET["goal"]).groupby("group", sort=False)
     medians = table[["lost", "found", "of_best", "trials"]].median()
     counts = {"robots": table.size(), "least": table["found"].min(), "back": table["back"].mean()}
     return medians.assign(**counts, planner=plans.groupby("group")["share"].mean())
@@ -355,32 +316,36 @@ _PLANNER: Any = {"color": "black", "marker": "x", "linestyle": "", "markersize":
 def speed_figure(shares: pandas.DataFrame, plans: pandas.DataFrame) -> Figure:
     """Speed after damage and after trials by cable, and over the number of trials."""
     figure = Figure(figsize=(8.0, 4.6), layout="constrained")
-    old, found = OKABE_ITO["orange"], OKABE_ITO["blue"]
+    found = OKABE_ITO["blue"]
+    looks = {
+        "lost": ("old gait", OKABE_ITO["orange"], -0.15),
+        "found": ("after trials", found, 0.15),
+    }
     by_cable, by_trial = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
-    names = [*dict.fromkeys(shares["group"])]
-    for height, name in enumerate(reversed(names)):
+    names = [*reversed(dict.fromkeys(shares["group"]))]
+    for height, name in enumerate(names):
         own = shares[shares["group"] == name]
-        for column, color, shift in (("lost", old, -0.15), ("found", found, 0.15)):
-            low, middle, high = (own[column].quantile(q) for q in (0.0, 0.5, 1.0))
+        for column, (_, color, shift) in looks.items():
+            low, middle, high = own[column].quantile([0.0, 0.5, 1.0])
             by_cable.hlines(height + shift, low, high, color=color, linewidth=1.5)
             by_cable.plot(middle, height + shift, "o", color=color, markersize=4.0)
         for share in plans[plans["group"] == name]["share"]:
             by_cable.plot(share, height, **_PLANNER)
-    by_cable.set_yticks(range(len(names)), [*reversed(names)], fontsize="small")
-    by_cable.plot([], [], "o-", color=old, markersize=4.0, label="old gait")
-    by_cable.plot([], [], "o-", color=found, markersize=4.0, label="after trials")
+    by_cable.set_yticks(range(len(names)), names, fontsize="small")
+    for label, color, _ in looks.values():
+        by_cable.plot([], [], "o-", color=color, markersize=4.0, label=label)
     by_cable.plot([], [], **_PLANNER, label="planner")
     by_cable.legend(frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.4, 1.0))
     by_cable.set(xlabel="speed / speed before the damage")
     by_cable.margins(x=0.03)
-    counts = range(TRIALS + 1)
+    counts = range(SET["trials"] + 1)
     quantiles = shares[[f"best{k}" for k in counts]].quantile([0.25, 0.5, 0.75]).to_numpy()
     shade = {"color": found, "alpha": 0.25, "linewidth": 0.0}
     by_trial.fill_between(counts, quantiles[0], quantiles[2], **shade)
     by_trial.plot(counts, quantiles[1], "o-", color=found, markersize=4.0)
-    by_trial.axhline(GOAL, color="black", linestyle="--", linewidth=0.8)
+    by_trial.axhline(SET["goal"], color="black", linestyle="--", linewidth=0.8)
     by_trial.set(xlabel="trials", ylabel="median and quartiles", ylim=(0.0, 1.6))
-    by_trial.set_xticks(range(0, TRIALS + 1, 2))
+    by_trial.set_xticks(counts[::2])
     return figure
 
 
@@ -390,38 +355,25 @@ def page(walks: Sequence[Row], plan_rows: Sequence[Row], candidates: Sequence[Ro
     is_whole = by_plan["cable"] == ""
     return rendered(
         "damage.md",
-        robots=len(shares),
-        walks=len(walks),
-        gaits=len(candidates),
-        known=len(candidates) // len(STRENGTHS),
-        speed=candidates[0]["speed"],
-        fastest=max(row["speed"] for row in candidates),
+        walks=walks,
+        gaits=candidates,
+        shares=shares,
         medians=shares[["of_best", "lost", "found"]].median(),
-        reached=(shares["found"] >= GOAL).mean(),
         plans=by_plan[~is_whole],
         whole=by_plan[is_whole].iloc[0],
         cpu=by_plan["cpu_s"].median(),
         cables=by_cable(shares, by_plan),
-        seeds=shares["seed"].nunique(),
-        turns=len(TURNS),
         steady=scenario().simulation.settling_time,
-        reach=REACH,
-        goal=GOAL,
+        set=SET,
     )
 
 
-def main() -> None:
-    """Records what is missing, and writes the page."""
-    HERE.mkdir(exist_ok=True)
+def main(_: Sequence[str] = ()) -> None:
+    """Records what is missing, and writes the page and its figure."""
     find_gaits()
     find_candidates()
     trials()
     plans()
-    write_page()
-
-
-def write_page() -> None:
-    """Writes the page and its figure from the records."""
     walks, plan_rows = read(WALKS), read(PLANS)
     figure = speed_figure(outcomes(walks), planned(plan_rows))
     save_figure(figure, HERE, "speed", kinds=["svg"])
@@ -429,5 +381,4 @@ def write_page() -> None:
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(description="Writes damage/README.md.").parse_args()
-    main()
+    run_script(main)

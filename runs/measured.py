@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,9 +21,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas
 from matplotlib.figure import Figure
-from measured_intervals import cases, committed
+from measured_intervals import cases, committed, kind_and_unit, measured_rise
 from measured_intervals import predicted as intervals_of
 from measured_robots import (
+    AXES,
     HERE,
     JUMPS,
     SPRING_DAMPINGS,
@@ -91,6 +91,9 @@ BLINDEST = ("hexagonal prism", "Laika", "jumper, at rest")
 
 # Pictures
 
+BAR: Any = {"linewidth": 3.0, "alpha": 0.5}
+"""Looks of measured ranges."""
+
 
 @common_style()
 def intervals_figure(rows: pandas.DataFrame) -> Figure:
@@ -121,22 +124,13 @@ def simplex_figure(under_load: pandas.DataFrame) -> Figure:
     """Height and cable forces of the simplex over the load."""
     figure = Figure(figsize=(7.0, 3.2), layout="constrained")
     heights, forces = figure.subplots(1, 2)
-    panels = {
-        heights: {"H": "upper nodes"},
-        forces: {"CV": "vertical", "CB": "bottom", "CT": "top"},
-    }
-    for axes, kinds in panels.items():
+    forces_of = {"CV": "vertical", "CB": "bottom", "CT": "top"}
+    for axes, kinds in ((heights, {"H": "upper nodes"}), (forces, forces_of)):
         for number, (kind, label) in enumerate(kinds.items()):
             axes.plot(under_load["load"], under_load[kind], label=label, **line_style(number))
-            axes.vlines(
-                under_load["load"],
-                under_load[f"{kind} least"],
-                under_load[f"{kind} greatest"],
-                color=LINE_COLOURS[number],
-                linewidth=3.0,
-                alpha=0.5,
-            )
-        axes.vlines([], 0.0, 0.0, color="black", linewidth=3.0, alpha=0.5, label="measured")
+            ends = (under_load[f"{kind} {end}"] for end in ("least", "greatest"))
+            axes.vlines(under_load["load"], *ends, color=LINE_COLOURS[number], **BAR)
+        axes.vlines([], 0.0, 0.0, color="black", label="measured", **BAR)
         axes.set_xlabel("load per upper node, kN")
         axes.margins(x=0.03)
         axes.legend(frameon=False)
@@ -153,18 +147,16 @@ def spine_figure(poses: pandas.DataFrame) -> Figure:
     line = {"linestyle": "-", "color": LINE_COLOURS[1], "linewidth": 2.0}
     dots = {"linestyle": "", "marker": ".", "color": LINE_COLOURS[2], "markersize": 3.0}
     for _, test in poses.groupby("test"):
-        place.plot(1e3 * test["predicted_x_m"], 1e3 * test["predicted_y_m"], **line)
-        place.plot(1e3 * test["x_m"], 1e3 * test["y_m"], **dots)
-        angle.plot(test["step"], np.degrees(test["predicted_rad"]), **line)
-        angle.plot(test["step"], np.degrees(test["rad"]), **dots)
+        for begin, style in {"predicted_": line, "": dots}.items():
+            x, y, turn = (test[f"{begin}{column}"] / size for column, size in AXES.values())
+            place.plot(x, y, **style)
+            angle.plot(test["step"], turn, **style)
     place.margins(x=0.03)
     angle.margins(x=0.03)
     place.set(xlabel="x, mm", ylabel="y, mm")
     angle.set(xlabel="set of cable lengths", ylabel="angle, degrees")
-    lines = [angle.lines[0], angle.lines[1]]
-    figure.legend(
-        lines, ["predicted", "camera"], loc="outside upper center", ncols=2, frameon=False
-    )
+    above: Any = {"frameon": False, "ncols": 2, "loc": "outside upper center"}
+    figure.legend(angle.lines[:2], ["predicted", "camera"], **above)
     return figure
 
 
@@ -172,17 +164,15 @@ def spine_figure(poses: pandas.DataFrame) -> Figure:
 def jump_figure(jumps: dict[float, list[tuple[float, float]]]) -> Figure:
     """Rise of the jumper over the share that is wound up."""
     figure = Figure(figsize=(5.0, 3.2), layout="constrained")
-    axes = figure.subplots()
-    shares = 100.0 * np.array(list(jumps))
+    axes, shares = figure.subplots(), 100.0 * np.array(list(jumps))
     for number, damping in enumerate(SPRING_DAMPINGS):
         rises = [results[number][0] for results in jumps.values()]
         style = line_style(number + 1)
         axes.plot(shares, rises, marker="o", label=f"springs damped by {damping:g} N s/m", **style)
-    for share, text in JUMPS.items():
-        if " to " in text:
-            low, high = map(float, text.split(" to "))
-            axes.vlines(100.0 * share, low, high, color="black", linewidth=6.0, alpha=0.4)
-    axes.plot([], [], color="black", linewidth=6.0, alpha=0.4, label="measured")
+    ends = np.transpose([measured_rise(share) for share in jumps])
+    wide: Any = {"color": "black", "linewidth": 6.0, "alpha": 0.4}
+    axes.vlines(shares, *ends, **wide)
+    axes.plot([], [], label="measured", **wide)
     axes.margins(x=0.03)
     axes.set(xlabel="wound up by, %", ylabel="rise of the centre, m")
     axes.legend(frameon=False)
@@ -199,10 +189,11 @@ def measured_rows() -> dict[str, pandas.DataFrame]:
     anew = pandas.concat([rows for name, rows in found.items() if name.startswith("anew_")])
     known = pandas.concat([rows for name, rows in found.items() if name in KNOWN])
     rows = {**found, "known": known, "blind": blind, "anew": anew}
-    rows = {
-        name: each[each["measured"].notna()].reset_index(drop=True) for name, each in rows.items()
+    rows = {name: each.dropna(subset="measured") for name, each in rows.items()}
+    return {
+        name: each.reset_index(drop=True).assign(inside=holds(each).to_numpy())
+        for name, each in rows.items()
     }
-    return {name: each.assign(inside=holds(each)) for name, each in rows.items()}
 
 
 KNOWN = ("simplex_loads", "simplex_frequencies", "spine", "jumps")
@@ -215,14 +206,11 @@ def of_simulations(
     """Numbers of the page that need simulations, apart from its three figures."""
     steps = [int(np.abs(under_load["load"] - load).argmin()) for load in (0.0, 0.3, 0.6, 1.0, 2.1)]
     apart: dict[str, Any] = {}
-    for label, column, size in (
-        ("x, mm", "x_m", 1e-3),
-        ("y, mm", "y_m", 1e-3),
-        ("angle, degrees", "rad", math.radians(1.0)),
-    ):
+    for axis, (column, size) in AXES.items():
         predicted = poses[f"predicted_{column}"]
         wanted = float((predicted - poses[f"wanted_{column}"]).abs().max()) / size
         camera = (poses[column] - predicted) / size
+        label = f"{axis}, {kind_and_unit(axis)[1]}"
         apart[label] = {"wanted": wanted, "camera": [camera.mean(), camera.min(), camera.max()]}
     fit = fitted_free_lengths("top", "vertical").parameters
     return {

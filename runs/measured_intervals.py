@@ -7,13 +7,14 @@ quantities of its tests. Draws within tolerances and unknowns give each quantity
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas
 from measured_robots import (
+    AXES,
     HERE,
     JUMPS,
     SADDLE,
@@ -25,6 +26,8 @@ from measured_robots import (
     compression,
     in_the_air,
     lengthened,
+    load_on_simplex,
+    on_its_own,
     pose,
     rise_of,
     stressed,
@@ -33,10 +36,11 @@ from measured_robots import (
     wound_up,
 )
 from scipy.optimize import brentq, linear_sum_assignment
+from script import read_settings
 
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_json, read_text, write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.lab.predict.predict import drawn_scenarios, errors_of, intervals
 from tetra_drake.lab.predict.variates import Variate, variates_of
 from tetra_drake.lab.study.equilibrium import study_equilibrium
@@ -46,7 +50,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.struts import axial_forces
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario, scenario_of
-from tetra_drake.scenario.yaml_text import parse_yaml
 
 KEPT = HERE / "predictions"
 """Folder of the finished cases. A case whose file is there is not computed again."""
@@ -54,29 +57,18 @@ SEED = 0
 
 BUCKLING, LENGTH, CABLE = 10.66e3, 2.9998, 0.502
 """Buckling load (N) and length (m) of a tube of the simplex, and mass (kg) of a cable."""
-TIGHTENED_FROM = 1.5e3
-"""Self-stress (N) of the simplex from which the lengthening of one tube is counted."""
 SAG = 0.7e-3
 """Sag (m) of an unloaded tube under its weight."""
-_GIVEN = parse_yaml(read_text(HERE / "cases.yaml", "cases"), "cases.yaml")
+_GIVEN = read_settings(HERE / "cases.yaml")
 CASES, ELEMENTS = _GIVEN["cases"], _GIVEN["elements"]
 """The cases by the names of their files in KEPT, and the simplex's cables by their names there."""
 KINDS = {word: kind for kind, words in _GIVEN["kinds"].items() for word in words}
 """Kind and unit of a quantity as a text, by its first word without number."""
 FACTS = read_json(HERE / "blind_measured.json", "measured values")
-LOADING = {1.5: "simplex_loading.csv", 8.5: "simplex_loading_8.5kN.csv"}
-"""Files of what was measured under load, by self-stress (kN)."""
 LEAP = 6
 """Number of sets of cable lengths from one pose of the spine that is computed to the next. Between
 them, the difference from the pose of the authors' statics is interpolated."""
-FEET = {
-    "front/legD/legboxend": (("front right (A)", "front left (B)"), 1.0, "R"),
-    "rear/legD/legboxend": (("rear right (C)", "rear left (D)"), -1.0, "R"),
-}
-"""Feet of Laika by node: names of the foot and of its mirror image, sense of the twist that lifts
-the foot, and its side. The test of the one is the mirror image of the other's."""
 SPINE_AXIS = np.array([0.0, 0.0, 0.1785])
-LAW = ("stiffness", "tension")
 TWIST = 15.0
 """Twist (degrees) of Laika's centre vertebra at which the loads of its feet are computed."""
 
@@ -123,40 +115,37 @@ def predicted(name: str, case: Case) -> pandas.DataFrame:
     from its file in KEPT if it is there."""
     file = KEPT / f"{name}.csv"
     if not file.exists():
-        scenario, unknowns = case.scenario(), case.unknowns
-        own = variates_of(scenario.model_dump(), scenario.all_tolerances)
-        further = [
-            Variate(key.partition(":")[0], each.law, {key: each.deviation})
-            for key, each in unknowns.items()
-        ]
-        errors = errors_of([*own, *further], SEED, case.draws)
-        drawn = drawn_scenarios(scenario, own, errors[:, : len(own)])
-        able = {k: each for k, each in enumerate(drawn) if isinstance(each, Scenario)}
-        numbers = [
-            {
-                key: each.middle + each.deviation * error
-                for (key, each), error in zip(unknowns.items(), row, strict=True)
-            }
-            for row in errors[:, len(own) :].tolist()
-        ]
-        if not able:
-            raise next(each for each in drawn if isinstance(each, InputError))
-        found = case.predict([(each, numbers[k]) for k, each in able.items()])
-        table = pandas.DataFrame(found, index=list(able)).reindex(range(case.draws))
-        rows, shares = intervals([*own, *further], errors, table)
-        rows["mostly from"] = [_most(share) for _, share in shares.iterrows()]
-        rows.insert(0, "quantity", rows.index)
-        rows.insert(0, "structure", case.structure)
-        kinds = [kind_and_unit(str(quantity)) for quantity in rows["quantity"]]
-        rows.insert(2, "kind", [kind for kind, _ in kinds])
-        rows.insert(3, "unit", [unit for _, unit in kinds])
-        KEPT.mkdir(exist_ok=True)
-        write_whole(file, rows.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
-    rows = pandas.read_csv(file)
-    measured = case.measured()
-    rows["measured"] = [measured.get(quantity, math.nan) for quantity in rows["quantity"]]
-    rows["assumed"] = case.assumed
-    return rows
+        text = made(case).to_csv(index=False, float_format="%.6g", lineterminator="\n")
+        write_whole(file, text)
+    rows, measured = pandas.read_csv(file), case.measured()
+    values = [measured.get(quantity, math.nan) for quantity in rows["quantity"]]
+    return rows.assign(measured=values, assumed=case.assumed)
+
+
+def made(case: Case) -> pandas.DataFrame:
+    """Intervals of a case, for its file. Raises InputError if no draw is possible."""
+    scenario, unknowns = case.scenario(), case.unknowns
+    own = variates_of(scenario.model_dump(), scenario.all_tolerances)
+    further = [
+        Variate(key.partition(":")[0], each.law, {key: each.deviation})
+        for key, each in unknowns.items()
+    ]
+    errors = errors_of([*own, *further], SEED, case.draws)
+    drawn = drawn_scenarios(scenario, own, errors[:, : len(own)])
+    able = {k: each for k, each in enumerate(drawn) if isinstance(each, Scenario)}
+    if not able:
+        raise next(each for each in drawn if isinstance(each, InputError))
+    sizes = np.array([each.deviation for each in unknowns.values()])
+    numbers = np.array([each.middle for each in unknowns.values()]) + sizes * errors[:, len(own) :]
+    named = [dict(zip(unknowns, row, strict=True)) for row in numbers.tolist()]
+    found = case.predict([(each, named[k]) for k, each in able.items()])
+    table = pandas.DataFrame(found, index=list(able)).reindex(range(case.draws))
+    rows, shares = intervals([*own, *further], errors, table)
+    kinds = [kind_and_unit(str(quantity)) for quantity in rows.index]
+    about = {"structure": case.structure, "quantity": rows.index}
+    about |= {"kind": [kind for kind, _ in kinds], "unit": [unit for _, unit in kinds]}
+    most = {"mostly from": [_most(share) for _, share in shares.iterrows()]}
+    return pandas.DataFrame(about, index=rows.index).join(rows).assign(**most)
 
 
 def committed() -> pandas.DataFrame:
@@ -243,59 +232,50 @@ def readings(robot: Robot, unknown: Unknowns) -> Values:
     return {key: value + unknown[f"reading:{key}"] for key, value in found.items()}
 
 
-def simplex_loads(
+def prestressed(
+    scenario: Scenario, unknown: Unknowns, self_stress: float
+) -> tuple[Scenario, float, float]:
+    """A simplex with a self-stress (kN) as far as it is known, how much longer its tubes are for
+    that (m), and its self-stress in N."""
+    wanted = 1e3 * self_stress + unknown["self-stress"]
+    first = SOFTNESS * wanted + 0.6e-3  # longer than any error of the lengths
+    return *stressed(scenario, wanted, first=first, within=2.0), wanted
+
+
+def simplex_tests(
     scenario: Scenario,
     unknown: Unknowns,
     *,
     self_stress: float,
-    loads: Sequence[float],
-    means: bool,
+    loads: Sequence[float] = (),
+    lengthenings: Sequence[float] = (),
+    means: bool = False,
+    **_: Any,
 ) -> Values:
-    """Heights and forces of the simplex under loads (kN) per upper node; or their means."""
-    wanted = 1e3 * self_stress + unknown["self-stress"]
-    first = SOFTNESS * wanted + 0.6e-3  # longer than any error of the lengths
-    _, base = stressed(scenario, wanted, first=first, within=2.0)
-    felt = 1.0 + unknown["load"]
+    """Heights and forces of the simplex under loads (kN) per upper node, or their means; or its
+    forces as one tube is lengthened, in mm from the self-stress (kN) on."""
+    base, wanted = prestressed(scenario, unknown, self_stress)[1:]
+    tests = {f"{load:.2f} kN": (load * (1.0 + unknown["load"]), 0.0) for load in loads}
+    tests |= {f"{by:+g} mm": (0.0, by + unknown["lengthening"]) for by in lengthenings}
     values: Values = {}
-    for load in loads:
-        force = {
-            f"robot.loads.{node}": ["0 N", "0 N", f"{-1e3 * load * felt!r} N"] for node in UPPER
-        }
+    for name, (load, own) in tests.items():
 
-        def longer(by: float, force: dict[str, list[str]] = force) -> Scenario:
-            return lengthened(scenario, base + by).with_changes(force)
+        def longer(by: float, load: float = load, own: float = own) -> Scenario:
+            one = lengthened(lengthened(scenario, base + by), own / 1e3, struts=1)
+            return one.with_changes(load_on_simplex(load))
 
-        found = readings(bowed(longer, unknown, wanted), unknown)
+        found = pandas.Series(readings(bowed(longer, unknown, wanted), unknown))
+        if lengthenings:
+            found = found[found.index.str[0] != "H"]
         if means:
-            table = pandas.Series(found)
-            found = table.groupby(table.index.str[:-1]).mean().to_dict()
-        values |= {f"{key} at {load:.2f} kN": value for key, value in found.items()}
+            found = found.groupby(found.index.str[:-1]).mean()
+        values |= {f"{key} at {name}": value for key, value in found.items()}
     return values
 
 
-def simplex_tightened(
-    scenario: Scenario, unknown: Unknowns, lengthenings: Sequence[float]
-) -> Values:
-    """Forces of the simplex as one tube is lengthened, in mm from TIGHTENED_FROM."""
-    wanted = TIGHTENED_FROM + unknown["self-stress"]
-    first = SOFTNESS * wanted + 0.6e-3
-    _, base = stressed(scenario, wanted, first=first, within=2.0)
-    values: Values = {}
-    for lengthening in lengthenings:
-        own = (lengthening + unknown["lengthening"]) / 1e3
-
-        def longer(by: float, own: float = own) -> Scenario:
-            return lengthened(lengthened(scenario, base + by), own, struts=1)
-
-        found = readings(bowed(longer, unknown, wanted), unknown)
-        forces = {key: value for key, value in found.items() if key[0] != "H"}
-        values |= {f"{key} at {lengthening:+g} mm": value for key, value in forces.items()}
-    return values
-
-
-def loads_measured(self_stress: float, loads: Sequence[float], means: bool) -> Values:
-    """Measured heights and forces of the simplex under loads; see simplex_loads()."""
-    table = pandas.read_csv(HERE / LOADING[self_stress])
+def loads_measured(file: str, loads: Sequence[float], means: bool, **_: Any) -> Values:
+    """Measured heights and forces of the simplex under loads; see simplex_tests()."""
+    table = pandas.read_csv(HERE / file)
     table = table[table["quantity"] != "angle"]
     names = table["element"].str[:-1] if means else table["element"]
     found: Values = {}
@@ -307,8 +287,8 @@ def loads_measured(self_stress: float, loads: Sequence[float], means: bool) -> V
     return found
 
 
-def tightened_measured(lengthenings: Sequence[float]) -> Values:
-    """Measured forces of the simplex as one tube is lengthened; see simplex_tightened()."""
+def tightened_measured(lengthenings: Sequence[float], **_: Any) -> Values:
+    """Measured forces of the simplex as one tube is lengthened; see simplex_tests()."""
     table = pandas.read_csv(HERE / "simplex_tightening.csv")
     table = table[(table["figure"] == "5c") & (table["quantity"] == "force")]
     return {
@@ -326,11 +306,8 @@ def simplex_frequencies(
     them: by Rayleigh's quotient for the mode without that."""
     values: Values = {}
     for stress in self_stresses:
-        wanted = 1e3 * stress + unknown["self-stress"]
-        first = SOFTNESS * wanted + 0.6e-3
-        study = study_equilibrium(
-            Robot.of(vibrating(stressed(scenario, wanted, first=first, within=2.0)[0]))
-        )
+        own, *_ = prestressed(scenario, unknown, stress)
+        study = study_equilibrium(Robot.of(vibrating(own)))
         mode = dict(zip(study.nodes.index, study.modes[0], strict=True))
         structure = structure_of(scenario)
         bars = [(mode[a], mode[b]) for a, b in structure.struts["tube"].pairs]
@@ -366,7 +343,7 @@ def spine_path(scenario: Scenario, unknown: Unknowns) -> Values:
     poses = spine_tests()
     tests = poses["test"].unique().tolist()
     table = poses[poses["test"] == tests[0]]
-    wanted = table[["wanted_x_m", "wanted_y_m", "wanted_rad"]].to_numpy()
+    wanted = table[[f"wanted_{column}" for column, _ in AXES.values()]].to_numpy()
     ways = np.gradient(wanted[:, :2], axis=0)
     steps = [*range(0, len(table) - 1, LEAP), len(table) - 1]
     differences = []
@@ -379,9 +356,9 @@ def spine_path(scenario: Scenario, unknown: Unknowns) -> Values:
         changes["robot.loads.c"] = [f"{float(x)!r} N", "0 N", f"{float(z)!r} N"]
         differences.append(pose(scenario.with_changes(changes)) - wanted[step])
     between = [np.interp(range(len(table)), steps, each) for each in np.transpose(differences)]
-    seen = (wanted + np.transpose(between)) * [1e3, 1e3, math.degrees(1.0)]
+    seen = (wanted + np.transpose(between)) / [size for _, size in AXES.values()]
     values: Values = {}
-    for place, axis in enumerate(("x", "y", "angle")):
+    for place, axis in enumerate(AXES):
         mean, spread = seen[:, place].mean() + unknown[f"camera:{axis}"], np.ptp(seen[:, place])
         spread += unknown["noise of the range"] * (0.8 if axis == "angle" else 1.0)
         for test in tests:
@@ -392,13 +369,9 @@ def spine_path(scenario: Scenario, unknown: Unknowns) -> Values:
 def spine_measured() -> Values:
     """Measured mean and range of the spine's poses in each test."""
     found: Values = {}
-    for axis, column, scale in (
-        ("x", "x_m", 1e3),
-        ("y", "y_m", 1e3),
-        ("angle", "rad", math.degrees(1.0)),
-    ):
+    for axis, (column, size) in AXES.items():
         for test, own in spine_tests().groupby("test"):
-            seen = own[column] * scale
+            seen = own[column] / size
             found |= {f"{axis} mean, {test}": seen.mean(), f"{axis} range, {test}": np.ptp(seen)}
     return found
 
@@ -418,17 +391,21 @@ def jumper_rises(draws: Sequence[Draw]) -> list[Values]:
     return values
 
 
+def measured_rise(share: float) -> list[float]:
+    """Least and greatest measured rise (m) of the jumper by the share that is wound up."""
+    return [float(end) for end in JUMPS[share].split(" to ")]
+
+
 def jumps_measured() -> Values:
     """Middles of the measured ranges of the jumper's rises."""
-    ranges = {share: [float(x) for x in text.split(" to ")] for share, text in JUMPS.items()}
-    return {f"rise at {100.0 * share:.0f} %": float(np.mean(x)) for share, x in ranges.items()}
+    return {
+        f"rise at {100.0 * share:.0f} %": float(np.mean(measured_rise(share))) for share in JUMPS
+    }
 
 
 def standing(name: str) -> Scenario:
     """Scenario of a structure of HERE on stiff ground."""
-    robot = f"!Structure {{file: {HERE / name}.yaml}}"
-    changes = {"name": name, "robot": robot, "ground.stiffness": "20 kN/m"}
-    return load_scenario("prism").with_changes(changes | {"strut_contact": "!Nothing {}"})
+    return on_its_own(name, **{"ground.stiffness": "20 kN/m"})
 
 
 def jumper_heights(scenario: Scenario, unknown: Unknowns) -> Values:
@@ -466,74 +443,66 @@ def measured_peaks() -> Values:
     return {f"frequency {mode + 1}": peaks[row] for row, mode in zip(rows, modes, strict=True)}
 
 
-def measured_lifts() -> Values:
+def measured_lifts(**_: Any) -> Values:
     """Measured twists (degrees) at which Laika's feet lift."""
-    lifts = {name[0]: abs(mean) for name, (mean, _) in FACTS["laika_lift_deg"].items()}
-    names = (name for names, *_ in FEET.values() for name in names)
-    return {f"lift of the {name} foot": lifts[name[-2]] for name in names}
+    lifts = FACTS["laika_lift_deg"]
+    return {f"lift of the {name} foot": abs(mean) for name, (mean, _) in lifts.items()}
 
 
 def twisted(scenario: Scenario, degrees: float) -> Scenario:
     """Laika with half B of its centre vertebra turned about the spine."""
-    turn = math.radians(degrees)
+    cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     changes: dict[str, object] = {}
     for node, place in structure_of(scenario).nodes.items():
         if "/tB/" not in node:
             continue
-        x, y, z = np.array(place) - SPINE_AXIS
-        turned = [
-            math.cos(turn) * x + math.sin(turn) * z,
-            y,
-            math.cos(turn) * z - math.sin(turn) * x,
-        ]
+        turned = np.array(place) - SPINE_AXIS
+        turned[::2] = np.array([[cosine, sine], [-sine, cosine]]) @ turned[::2]
         changes[f"robot.nodes.{node}"] = [f"{v!r} m" for v in (turned + SPINE_AXIS).tolist()]
     return scenario.with_changes(changes)
 
 
-def laika_lifts(scenario: Scenario, unknown: Unknowns) -> Values:
-    """Twists of Laika's centre vertebra (degrees) at which its feet lift.
+def laika_lifts(scenario: Scenario, unknown: Unknowns, feet: Mapping[str, Any]) -> Values:
+    """Twists of Laika's centre vertebra (degrees) at which its feet lift. `feet` are by node: names
+    of the foot and of its mirror image, whose test is the mirror image, sense of the twist that
+    lifts the foot, and its side.
 
     On the foot's side the spine has mechanical springs, which are pulled in; on the other side a
     lattice. The load of a foot is nearly linear in the twist, so that two loads lead to the twist
     without load.
     """
-    values: Values = {}
-    structure = structure_of(scenario)
+    structure, values = structure_of(scenario), Values()
     # The draw is made: tolerances of tensions, which are replaced here, would be left over.
     drawn = scenario.with_sections(robot=structure.model_copy(update={"tolerances": {}}))
-    for foot, (names, sense, side) in FEET.items():
-        changes: dict[str, object] = {}
-        pushed = unknown["centre of mass"] / 2.0 / 0.0755
-        for node, force in {"legCconnect": -pushed, "legDconnect": pushed}.items():
-            changes[f"robot.loads.rear/hips/{node}"] = ["0 N", "0 N", f"{force!r} N"]
+    pushed = unknown["centre of mass"] / 2.0 / 0.0755
+    loads = {"legCconnect": -pushed, "legDconnect": pushed}
+    aside = {f"robot.loads.rear/hips/{k}": ["0 N", "0 N", f"{x!r} N"] for k, x in loads.items()}
+    for foot, (names, sense, side) in feet.items():
+        changes: dict[str, object] = {**aside}
         for name, group in structure.cables.items():
             # The file has the springs on the left; they are on the side of the foot.
-            softer, pulled = name, 0.0
+            like, pulled = name, 0.0
             if name in ("HL", "HR"):
-                is_pulled = name[1] == side
-                softer, pulled = ("HL", unknown["pulled in"]) if is_pulled else ("HR", 0.0)
+                like, pulled = ("HL", unknown["pulled in"]) if name[1] == side else ("HR", 0.0)
             a, b = (np.array(structure.nodes[node]) for node in group.pairs[0])
-            stiffness, tension = (getattr(structure.cables[softer], key) for key in LAW)
+            stiffness, tension = (
+                getattr(structure.cables[like], key) for key in ("stiffness", "tension")
+            )
             free = float(np.linalg.norm(a - b)) - tension / stiffness - pulled / 1e3
-            changes |= {
-                f"robot.cables.{name}.stiffness": f"{stiffness!r} N/m",
-                f"robot.cables.{name}.tension": None,
-                f"robot.cables.{name}.free_length": f"{free!r} m",
-            }
-        own, loads = drawn.with_changes(changes), []
-        for twist in (0.0, sense * TWIST):
-            nodes = study_equilibrium(Robot.of(twisted(own, twist))).nodes
-            loads.append(float(nodes.loc[foot, "load"]))
-        falling = (loads[0] - loads[1]) / TWIST
-        lift = (loads[0] - unknown["load that is seen"]) / falling if falling > 0.0 else math.nan
-        lift *= 1.0 + unknown["rest of the model"]
+            law = {"stiffness": f"{stiffness!r} N/m", "tension": None, "free_length": f"{free!r} m"}
+            changes |= {f"robot.cables.{name}.{key}": value for key, value in law.items()}
+        own = drawn.with_changes(changes)
+        twists = [twisted(own, twist) for twist in (0.0, sense * TWIST)]
+        rest, less = (study_equilibrium(Robot.of(one)).nodes.loc[foot, "load"] for one in twists)
+        lift = (rest - unknown["load that is seen"]) * TWIST / (rest - less)
+        lift = lift * (1.0 + unknown["rest of the model"]) if rest > less else math.nan
         values |= {f"lift of the {name} foot": lift for name in names}
     return values
 
 
 TESTS: dict[str, tuple[Callable[[str], Scenario], Callable[..., Any], Callable[..., Values]]] = {
-    "loads": (in_the_air, simplex_loads, loads_measured),
-    "tightened": (in_the_air, simplex_tightened, tightened_measured),
+    "loads": (in_the_air, simplex_tests, loads_measured),
+    "tightened": (in_the_air, simplex_tests, tightened_measured),
     "frequencies": (in_the_air, simplex_frequencies, frequencies_measured),
     "spine": (in_the_air, spine_path, spine_measured),
     "jumps": (lambda name: load_scenario(str(HERE / f"{name}.yaml")), jumper_rises, jumps_measured),

@@ -44,10 +44,11 @@ HEIGHT_UNCERTAINTY = 2e-4
 
 SADDLE = ("horizontal_bottom", "horizontal_top", "saddle_bottom", "saddle_top")
 """Cables of the spine, in the order of its measurements."""
-CENTRE = 0.0291
-"""Distance (m) of the spine's node c behind the origin of its pose."""
-FLOOR = 0.3
-"""Height (m) of the origin of the spine's poses in spine.yaml."""
+AXES = {"x": ("x_m", 1e-3), "y": ("y_m", 1e-3), "angle": ("rad", math.radians(1.0))}
+"""Columns of the measured poses, and their units (mm, degrees) on the page."""
+CENTRE, FLOOR = 0.0291, 0.3
+"""Distance (m) of the spine's node c behind the origin of its pose, and height (m) of the origin in
+spine.yaml."""
 
 UNWOUND, RELEASED = 0.5816, 0.75
 """Free lengths (m) of the jumper's actuators before it is wound up, and after the release."""
@@ -59,15 +60,15 @@ JUMPS = {0.2: "0.28 to 0.36", 0.3: "0.45 to 0.52", 0.4: "0.61 to 0.98", 0.46: "1
 """Measured rise (m) of the jumper's centre by the share of UNWOUND that is wound up."""
 
 
+def on_its_own(name: str, **changes: str) -> Scenario:
+    """Scenario of a structure of HERE whose struts do not touch, with changes."""
+    changes = {"name": name, "robot": f"!Structure {{file: {HERE / name}.yaml}}", **changes}
+    return load_scenario("prism").with_changes({**changes, "strut_contact": "!Nothing {}"})
+
+
 def in_the_air(name: str) -> Scenario:
     """Scenario of a structure of HERE without ground."""
-    changes = {
-        "name": name,
-        "robot": f"!Structure {{file: {HERE / name}.yaml}}",
-        "terrain": "!Nothing {}",
-        "strut_contact": "!Nothing {}",
-    }
-    return load_scenario("prism").with_changes(changes)
+    return on_its_own(name, terrain="!Nothing {}")
 
 
 def structure_of(scenario: Scenario) -> StructureFile:
@@ -121,27 +122,30 @@ def simplex(self_stress: float) -> Scenario:
     return stressed(in_the_air("simplex"), 1e3 * self_stress)[0]
 
 
+def load_on_simplex(load: float) -> dict[str, list[str]]:
+    """Changes of a simplex to a load (kN) per upper node."""
+    return {f"robot.loads.{node}": ["0 N", "0 N", f"{-1e3 * float(load)!r} N"] for node in UPPER}
+
+
+def load_steps(*quantities: str) -> list[tuple[float, pandas.DataFrame]]:
+    """Loads (kN) per upper node of the simplex's test, with the quantities measured at each."""
+    measured = pandas.read_csv(HERE / "simplex_loading.csv")
+    measured["kind"] = measured["element"].str[:-1].where(measured["quantity"] != "height", "H")
+    steps = measured[measured["quantity"].isin(quantities)].groupby("step")
+    return [(max(0.0, of_step["x"].mean()), of_step) for _, of_step in steps]
+
+
 def simplex_under_load() -> pandas.DataFrame:
     """Heights (mm) of the upper nodes and forces (kN) of the simplex by the load (kN) per upper
     node: predicted and measured means, with the measured least and greatest."""
-    measured = pandas.read_csv(HERE / "simplex_loading.csv")
-    stressed = simplex(1.5)
-    measured["kind"] = measured["element"].str[:-1].where(measured["quantity"] != "height", "H")
-    rows = []
-    for _, of_step in measured[measured["quantity"] != "angle"].groupby("step"):
-        load = max(0.0, of_step["x"].mean())
-        force = ["0 N", "0 N", f"{-1e3 * load} N"]
-        loads = {f"robot.loads.{node}": force for node in UPPER}
-        robot = Robot.of(stressed.with_changes(loads))
-        study = study_equilibrium(robot)
+    stressed, rows = simplex(1.5), []
+    groups = {"CB": "bottom", "CT": "top", "CV": "vertical"}
+    for load, of_step in load_steps("height", "force"):
+        study = study_equilibrium(Robot.of(stressed.with_changes(load_on_simplex(load))))
         tension = study.cables.groupby("group")["tension"].mean() / 1e3
-        predicted = {
-            "H": 1e3 * np.mean([at_rest(robot)[node][2] for node in UPPER]),
-            "CB": tension["bottom"],
-            "CT": tension["top"],
-            "CV": tension["vertical"],
-        }
+        predicted = {"H": 1e3 * study.nodes.loc[[*UPPER], "z"].mean()}
         row = {"load": load}
+        predicted |= {kind: tension[name] for kind, name in groups.items()}
         for kind, value in predicted.items():
             values = of_step[of_step["kind"] == kind]["value"]
             row |= {kind: value, f"{kind} measured": values.mean()}
@@ -152,23 +156,16 @@ def simplex_under_load() -> pandas.DataFrame:
 
 def simplex_heights(most_load: float = 1.01) -> list[Rest]:
     """Measured mean heights of the upper nodes, up to a load (kN) per node, for a fit."""
-    measured = pandas.read_csv(HERE / "simplex_loading.csv")
-    heights = measured[measured["quantity"] == "height"]
-    cases = []
-    for _, of_step in heights.groupby("step"):
-        load = max(0.0, of_step["x"].mean())
-        if load > most_load:
-            continue
-        force = ["0 N", "0 N", f"{-1e3 * load} N"]
-        height = of_step["value"].mean() / 1e3
-        cases.append(
-            Rest(
-                changes={f"robot.loads.{node}": force for node in UPPER},
-                positions={f"{node} z": height for node in UPPER},
-                position_uncertainty=HEIGHT_UNCERTAINTY,
-            )
+    means = [(load, of_step["value"].mean()) for load, of_step in load_steps("height")]
+    return [
+        Rest(
+            changes=load_on_simplex(load),
+            positions={f"{node} z": height / 1e3 for node in UPPER},
+            position_uncertainty=HEIGHT_UNCERTAINTY,
         )
-    return cases
+        for load, height in means
+        if load <= most_load
+    ]
 
 
 def fitted_free_lengths(*groups: str) -> Fit:

@@ -17,7 +17,6 @@ arbitrary; the reason says with what the run was recorded, where that is not wha
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,8 +24,8 @@ import numpy as np
 from analyse import ROUNDINGS, sensitivity
 from parting import asked, made
 from record import EXPERIMENTS, HERE, Experiment, chosen
+from script import run_script
 
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import evaluate_all, evaluator_of
 from tetra_drake.evolution.manifest import MANIFEST
@@ -108,7 +107,4 @@ def main(names: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"outdated.py: {error}")
+    run_script(main)

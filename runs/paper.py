@@ -8,7 +8,7 @@ Writes paper/paper.md in the form of the Journal of Open Source Software.
 from __future__ import annotations
 
 import datetime
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +18,10 @@ from corpus import ENGINES
 from corpus import MEASURED as CORPUS
 from measured import Score, measured_rows, totals
 from page import rendered
+from script import read_settings, run_script
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_json, read_text, write_whole
-from tetra_drake.scenario.yaml_text import parse_yaml
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.settings.units import INCH
 
 HERE = Path(__file__).parent
@@ -49,7 +49,7 @@ def by_size(rows: pandas.DataFrame) -> list[pandas.DataFrame]:
 
 def released(citation: Path = CITATION) -> datetime.date:
     """Day of the release that CITATION.cff names. Raises InputError if it names none."""
-    fields, key = parse_yaml(read_text(citation, "citation"), citation), "date-released"
+    fields, key = read_settings(citation), "date-released"
     given = fields.get(key) if isinstance(fields, dict) else None
     try:
         return datetime.date.fromisoformat(str(given))
@@ -79,14 +79,11 @@ def paper() -> str:
     )
 
 
-def main() -> None:
+def main(_: Sequence[str] = ()) -> None:
     """Writes the paper."""
     write_whole(PAGE, paper())
     print(PAGE)
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except InputError as error:
-        sys.exit(f"paper.py: {error}")
+    run_script(main)

@@ -9,16 +9,17 @@ continues. Then planning_page.py writes the page README.md and its pictures from
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import functools
+import itertools
 import math
 import os
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,10 +40,11 @@ from planning_page import (
 )
 from records import append
 from scipy.ndimage import map_coordinates
+from script import evolved, run_script
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.experiment import evolve
+from tetra_drake.errors import InputError
+from tetra_drake.formatting import listed
 from tetra_drake.lab.planner import Planner
 from tetra_drake.lab.prototype.export import COMMAND, export
 from tetra_drake.lab.study.robustness import default_disturbances
@@ -203,55 +205,38 @@ class Episode:
         return plant, scenario.with_changes({"engine": MODEL})
 
 
-def goals(group: str, plant: str = "compiled", *, draws: bool = False) -> list[Episode]:
-    """Episodes with goals in 20 directions."""
+def goals() -> list[Episode]:
+    """Episodes with goals in 20 directions, or in some of them."""
     episodes = []
-    for number in range(20):
-        angle = math.radians(18.0 * number)
-        make_task = functools.partial(Way, [(FAR * math.cos(angle), FAR * math.sin(angle))])
-        name, draw = f"{18 * number} degrees", number if draws else None
-        episodes.append(Episode(group, name, make_task, plant=plant, draw=draw))
+    for group, given in EPISODES["goals"].items():
+        for number in range(0, 20, given.get("every", 1)):
+            angle = math.radians(18.0 * number)
+            make_task = partial(Way, [(FAR * math.cos(angle), FAR * math.sin(angle))])
+            plant, draw = given.get("plant", "compiled"), number if "draws" in given else None
+            name = f"{18 * number} degrees"
+            episodes.append(Episode(group, name, make_task, plant=plant, draw=draw))
     return episodes
-
-
-def course(number: int) -> tuple[tuple[float, float], list[tuple[float, float]]]:
-    """Goal and three pillars of a course: one in the way, the others in reach beside it."""
-    random = np.random.default_rng(number)
-    angle = random.uniform(-math.pi, math.pi)
-    ahead = np.array([math.cos(angle), math.sin(angle)])
-    left = np.array([-ahead[1], ahead[0]])
-    sides = random.uniform([-0.2, 0.5, -1.2], [0.2, 1.2, -0.5])
-    ways = random.uniform([1.2, 0.6, 1.2], [1.8, 1.6, 2.2])
-    pillars = ways[:, np.newaxis] * ahead + sides[:, np.newaxis] * left
-    x, y = (FAR * ahead).tolist()
-    return (x, y), [(x, y) for x, y in pillars.round(3).tolist()]
 
 
 def courses() -> list[Episode]:
-    """The slalom, and nine courses with three pillars each."""
-    episodes = [Episode("courses", "slalom", functools.partial(Way, **EPISODES["slalom"]))]
-    for number in range(9):
-        goal, pillars = course(number)
-        make_task = functools.partial(Way, [goal], pillars)
-        episodes.append(Episode("courses", f"course {number + 1}", make_task))
-    return episodes
+    """Episodes with pillars: the slalom, and courses with three pillars each."""
+    given = EPISODES["courses"].items()
+    return [Episode("courses", name, partial(Way, **course)) for name, course in given]
 
 
 def speeds() -> list[Episode]:
     """The rover as fast as it can, on level ground and up inclines, on three engines."""
-    steady, episodes = {"simulation.steady_from": "2 s"}, []
-    make = functools.partial(Episode, "speeds", make_task=Ahead)
+    steady, plants, episodes = {"simulation.steady_from": "2 s"}, EPISODES["engines"], []
+    make = partial(Episode, "speeds", make_task=Ahead)
     for ground, level in EPISODES["level"].items():
-        for plant in EPISODES["engines"]:
-            for seed in range(level["seeds"]):
-                own = {"changes": steady | level["changes"], "plant": plant, "most": 40.0}
-                name = f"{ground}, {plant}, seed {seed}"
-                episodes.append(make(name, planning={"seed": seed}, **own))
-    for degrees, friction in EPISODES["slopes"]:
-        steep = steady | uphill(degrees, friction)
-        for plant in EPISODES["engines"]:
-            name = f"{degrees} degrees, friction {friction:g}, {plant}"
-            episodes.append(make(name, changes=steep, plant=plant, most=10.0))
+        for plant, seed in itertools.product(plants, range(level["seeds"])):
+            own = {"changes": steady | level["changes"], "plant": plant, "most": 40.0}
+            name = f"{ground}, {plant}, seed {seed}"
+            episodes.append(make(name, planning={"seed": seed}, **own))
+    for (degrees, friction), plant in itertools.product(EPISODES["slopes"], plants):
+        name = f"{degrees} degrees, friction {friction:g}, {plant}"
+        changes = steady | uphill(degrees, friction)
+        episodes.append(make(name, changes=changes, plant=plant, most=10.0))
     return episodes
 
 
@@ -267,11 +252,7 @@ def climbing_command() -> Command:
     gait if that is not done."""
     gait = EPISODES["gait"]
     changes = {**uphill(20, 0.8), **gait["row"], **gait["evolution"]}
-    scenario, is_there = (
-        load_scenario("motors").with_changes(changes),
-        (SCRATCH / MANIFEST).exists(),
-    )
-    run = evolve(scenario, SCRATCH, resume=is_there, reevaluate=False, report=False)
+    run = evolved(load_scenario("motors").with_changes(changes), SCRATCH)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "uphill"
         export(run, run, out, rate=1.0 / gait["planner"]["control_period"])
@@ -282,24 +263,23 @@ def others() -> list[Episode]:
     """Other robots: turns, and up inclines, also by changes of a gait's commands."""
     episodes, gait = [], EPISODES["gait"]
     for each in EPISODES["others"]:
-        task = functools.partial(Turn, math.radians(each["turn"])) if "turn" in each else Ahead
-        changes = uphill(*each["slope"]) if "slope" in each else {}
-        episode = Episode(
-            "others", each["name"], task, each["base"], changes, most=each.get("most", 60.0)
-        )
+        task = partial(Turn, math.radians(each["turn"])) if "turn" in each else Ahead
+        changes, own = uphill(*each["slope"]) if "slope" in each else {}, {}
         if "climb" in each:
-            own = {"changes": changes | gait["row"], "planning": gait["planner"]}
-            episode = replace(episode, plant=each["climb"], make_command=climbing_command, **own)
-        episodes.append(episode)
+            changes |= gait["row"]
+            own = {"plant": each["climb"], "planning": gait["planner"]}
+            own["make_command"] = climbing_command
+        most = each.get("most", 60.0)
+        episodes.append(
+            Episode("others", each["name"], task, each["base"], changes, most=most, **own)
+        )
     return episodes
 
 
 def all_episodes() -> list[Episode]:
     """All episodes, in the order of their importance."""
-    more, drawn = goals("goals, MuJoCo", "MuJoCo"), goals("goals, disturbed", draws=True)
-    real_time = goals("real time")[::4]
-    each = (goals("goals, compiled"), courses(), more, drawn, speeds(), others(), real_time)
-    return [episode for group in each for episode in group]
+    every = [*goals(), *courses(), *speeds(), *others()]
+    return sorted(every, key=lambda each: GROUPS.index(each.group))
 
 
 class Over(Exception):
@@ -393,15 +373,16 @@ def run_all(episodes: Sequence[Episode], folder: Path) -> None:
 
 
 def main(groups: Sequence[str], folder: Path = HERE) -> None:
-    """Runs the episodes of groups, or all, films the slalom, and writes the page."""
+    """Runs the episodes of groups, or all, films the slalom, and writes the page. Raises
+    InputError."""
+    if unknown := {*groups} - {*GROUPS}:
+        raise InputError("GROUP", "", f"found {listed([*unknown])}, expected {listed(GROUPS)}")
     run_all([each for each in all_episodes() if not groups or each.group in groups], folder)
     if not (folder / FILM).exists():
         slalom, *_ = courses()
-        film(run_episode(slalom)[1], EPISODES["slalom"]["pillars"], folder / FILM)
+        film(run_episode(slalom)[1], EPISODES["courses"]["slalom"]["pillars"], folder / FILM)
     write_page(folder, Counter(episode.group for episode in all_episodes()))
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("group", nargs="*", choices=[[], *GROUPS])
-    main(parser.parse_args().group)
+    run_script(main)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +18,15 @@ from page import rendered
 from PIL import Image
 from record import load_times
 from records import read
+from script import read_settings
 
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import read_text, write_whole
+from tetra_drake.files import write_whole
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.scenario.yaml_text import parse_yaml
 
 HERE = Path(__file__).parent / "planning"
 RECORDS, FILM = "records.jsonl", "slalom.gif"
-EPISODES = parse_yaml(read_text(HERE / "episodes.yaml", "episodes"), "episodes.yaml")
+EPISODES: dict[str, Any] = read_settings(HERE / "episodes.yaml")
 """What is run, see the file."""
 GROUPS = (
     "goals, compiled",
@@ -111,33 +113,36 @@ def draw_pillar(axes: Axes, x: float, y: float, *, zorder: float) -> None:
 # The page
 
 
+def draw_way(axes: Axes, record: Record) -> None:
+    """Draws the path of an episode, with circles around the places to pass and at the pillars."""
+    axes.plot(*np.transpose(record["path"]), linewidth=0.8)
+    for place in record["places"]:
+        axes.add_patch(Circle(place, NEAR, color="0.8", zorder=0))
+    for place in record["pillars"]:
+        axes.add_patch(Circle(place, PILLAR, color="C1"))
+
+
 def goals_figure(groups: Mapping[str, Sequence[Record]]) -> Figure:
     """Paths to the goals, a panel for each group."""
     figure = Figure(figsize=(8.0, 3.0), layout="constrained")
     panels = figure.subplots(1, len(groups))
     for axes, (name, records) in zip(panels, groups.items(), strict=True):
         for record in records:
-            (goal,) = record["places"]
-            axes.plot(*np.transpose(record["path"]), linewidth=0.8)
-            axes.add_patch(Circle(goal, NEAR, color="0.8", zorder=0))
+            draw_way(axes, record)
         axes.set(title=name, aspect="equal", xlim=(-3.6, 3.6), ylim=(-3.6, 3.6), xlabel="x (m)")
     panels[0].set(ylabel="y (m)")
     return figure
 
 
 def courses_figure(records: Sequence[Record]) -> Figure:
-    """Paths among pillars, with the circles around the places to pass."""
+    """Paths among pillars."""
     figure = Figure(figsize=(8.0, 6.6), layout="constrained")
     names = [record["name"] for record in records]
     cells = [*(names[:1] or ["."]) * (12 - len(names[1:])), *names[1:]]  # the slalom is wider
     panels = figure.subplot_mosaic(np.reshape(cells, (3, 4)).tolist())
     for record in records:
         axes = panels[record["name"]]
-        axes.plot(*np.transpose(record["path"]), linewidth=0.8)
-        for place in record["places"]:
-            axes.add_patch(Circle(place, NEAR, color="0.8", zorder=0))
-        for place in record["pillars"]:
-            axes.add_patch(Circle(place, PILLAR, color="C1"))
+        draw_way(axes, record)
         axes.set_title(record["name"], fontsize="medium")
         axes.set_aspect("equal", adjustable="datalim")
         axes.autoscale_view()
@@ -172,38 +177,30 @@ def write_page(folder: Path, planned: Mapping[str, int]) -> None:
     save_figure(goals_figure(goals), folder, "goals", kinds=["svg"])
     save_figure(courses_figure(groups["courses"]), folder, "courses", kinds=["svg"])
     plants, period = EPISODES["engines"], EPISODES["planner"]["decision_period"]
+    found = partial(speeds, groups["speeds"])
     level = {
-        ground: {plant: speeds(groups["speeds"], f"{ground}, {plant}, seed") for plant in plants}
+        ground: {plant: found(f"{ground}, {plant}, seed") for plant in plants}
         for ground in EPISODES["level"]
     }
-    usual, alike = ([middle for middle, *_ in each.values()] for each in level.values())
-    slopes = [f"{degrees} degrees, friction {mu:g}" for degrees, mu in EPISODES["slopes"]]
+    cpu = {name: [each["cpu"] for each in of] for name, of in groups.items() if of}
     walls = [record["wall"] for record in groups["real time"]]
-    cpu = [each for records in goals.values() for record in records for each in record["cpu"]]
+    of_goals = itertools.chain(
+        *(times for name, of in cpu.items() if name in goals for times in of)
+    )
     text = rendered(
         "planning.md",
-        runs_of=[f"{len(each)} of {planned[group]} ({group})" for group, each in groups.items()],
+        given=EPISODES,
+        planned=planned,
         groups=groups,
         goals=goals,
-        costs={
-            name: costs([record["cpu"] for record in records], CORES * period)
-            for name, records in groups.items()
-            if records
-        },
+        costs={name: costs(times, CORES * period) for name, times in cpu.items()},
         walls=costs(walls, period) if walls else None,
-        plants=[*plants],
         level=level,
-        slower=1.0 - usual[1] / usual[0],
-        alike=max(alike) / min(alike) - 1.0,
-        slopes={
-            slope: [speeds(groups["speeds"], f"{slope}, {plant}")[0] for plant in plants]
-            for slope in slopes
-        },
-        climbs=[each for each in EPISODES["others"] if "climb" in each],
+        medians=[[middle for middle, *_ in each.values()] for each in level.values()],
+        found=found,
         others={record["name"]: record for record in groups["others"]},
-        samples=EPISODES["planner"]["samples"],
         film=FILM,
         evolved=load_times(HERE.parent)["rolling"]["evolution"]["cores_s"],
-        second=float(np.mean(cpu)) / period,
+        second=float(np.mean([*of_goals])) / period,
     )
     write_whole(folder / "README.md", text)

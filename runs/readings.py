@@ -10,28 +10,23 @@ finished readings are skipped. `python runs/thesis_page.py` shows the numbers.
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 import pandas
+from script import evolved, read_record, read_settings, run_script
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.experiment import evolve
-from tetra_drake.files import check_file, read_json, read_text, write_whole
+from tetra_drake.files import check_file, write_whole
 from tetra_drake.formatting import listed, ranged
-from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.lab.study.statistics import interval, interval_of_resamples, resampled
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
-from tetra_drake.scenario.yaml_text import parse_yaml
 
 HERE = Path(__file__).parent
 RECORD = HERE / "thesis" / "readings.json"
@@ -56,24 +51,13 @@ class Reading:
     """Settings of SteadyState that end them."""
 
 
-def load_readings(file: Path) -> dict[str, dict[str, Reading]]:
-    """The readings of a file by part and name."""
-    content = parse_yaml(read_text(file, "readings"), file)
-    return {
-        part: {name: Reading(**given) for name, given in readings.items()}
-        for part, readings in content.items()
-    }
-
-
-_GIVEN = load_readings(HERE / "readings.yaml")
-_SLIPPING = {
-    f"slip-{name}": replace(reading, about=f"slips; {reading.about}", base="thesis-reversal")
-    for name, reading in _GIVEN["slips"].items()
-}
-_REVERSAL = Reading("a node slips until its velocity changes sign", run="thesis-reversal")
-READINGS = _GIVEN["as-written"] | {"reversal": _REVERSAL} | _SLIPPING
-ALL = READINGS | _GIVEN["future"]
-COARSE, FIXED = (_SLIPPING[f"slip-{name}"].changes["engine"] for name in ("coarse", "fixed"))
+READINGS, FUTURE = (
+    {name: Reading(**given) for name, given in part.items()}
+    for part in read_settings(HERE / "readings.yaml").values()
+)
+"""Readings by name, and variations that the thesis proposes; see the file."""
+ALL = READINGS | FUTURE
+COARSE, FIXED = (READINGS[f"slip-{name}"].changes["engine"] for name in ("coarse", "fixed"))
 """Engines of two readings."""
 
 
@@ -84,15 +68,8 @@ def run_of(name: str) -> Run:
         return run_of(reading.trials_of)
     if reading.run:
         return load_run(HERE / reading.run)
-    out, base = SCRATCH / name, load_scenario(reading.base).on_engine("compiled")
-    return evolve(
-        base.with_changes({"name": f"reading-{name}"} | dict(reading.changes)),
-        out,
-        resume=(out / MANIFEST).exists(),
-        reevaluate=False,
-        report=False,
-        progress=Progress(sys.stdout),
-    )
+    base, changes = load_scenario(reading.base).on_engine("compiled"), dict(reading.changes)
+    return evolved(base.with_changes({"name": f"reading-{name}"} | changes), SCRATCH / name)
 
 
 def last_iteration(means: Sequence[float], settings: SteadyState) -> int:
@@ -179,17 +156,19 @@ def factor_interval(trials: pandas.DataFrame) -> tuple[float, float]:
 
 def load_record(path: Path) -> Record:
     """The recorded trials by reading. Raises InputError if the record cannot be read."""
-    record: Record = read_json(path, "record; run `python runs/readings.py`")
-    try:
-        tables_of(record)
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise InputError(path, "", f"cannot be read ({error!r}); delete it") from error
+    return read_record(path, _checked, "readings.py")
+
+
+def _checked(record: Record) -> Record:
+    tables_of(record)
     return record
 
 
 def tables_of(record: Record) -> dict[str, pandas.DataFrame]:
     """Tables of the trials by reading, the nearest to the thesis first."""
     tables = {name: pandas.DataFrame(trials) for name, trials in record.items()}
+    for table in tables.values():
+        table["rise"] = 100.0 * (table["best_in"] / table["initial_best_in"] - 1.0)
     return dict(sorted(tables.items(), key=lambda item: factor(item[1])))
 
 
@@ -220,10 +199,4 @@ def main(names: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        with heeding_interrupts():
-            main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"readings.py: {error}")
-    except KeyboardInterrupt:
-        sys.exit("readings.py: interrupted; the same command goes on")
+    run_script(main)

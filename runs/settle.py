@@ -8,11 +8,12 @@ with its 95 % confidence interval, by bootstrap over the trials.
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from analyse import Analysis, load_analysis
+from script import run_script
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, ranged
@@ -60,7 +61,7 @@ def settled(first: Path, second: Path) -> TextTable:
     return TextTable(["mean of the trials", first.name, second.name, "difference"], rows)
 
 
-def main(runs: list[str]) -> None:
+def main(runs: Sequence[str]) -> None:
     """Compares two runs."""
     if len(runs) != 2:
         raise InputError("RUN RUN", "", f"found {listed(runs)}, expected two runs")
@@ -68,7 +69,4 @@ def main(runs: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"settle.py: {error}")
+    run_script(main)

@@ -1,10 +1,10 @@
-"""Travelling sines in place of a network: how far they move the thesis's robot, by reading.
+"""Travelling sines in place of a network: how far they move the robots of recorded runs.
 
-    python runs/sine.py
+    python runs/sine.py [NAME ...]
 
 A sine has two numbers: its frequency, and its lag from each junction to the next. Its amplitude is
-the peak of the signals of the reading's best evolved gait. The script writes the farthest sine of
-each recorded run in RUNS to thesis/sine.json.
+the peak of the signals of the run's best gait. The script writes the farthest of TRIED sines of
+each recorded run, by default of RUNS, to thesis/sine.json.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import itertools
 import json
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,31 +22,41 @@ from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import write_whole
+from tetra_drake.laws.phase import PhaseOscillators
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.command import Command
+from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 
 HERE = Path(__file__).parent
 RECORD = HERE / "thesis" / "sine.json"
-RUNS = ["thesis", "thesis-listing", "thesis-reversal", "coulomb"]
-FREQUENCIES = np.arange(0.3, 1.15, 0.1)
-"""Frequencies in Hz."""
-LAGS = np.array([sign * lag for sign in (1, -1) for lag in range(15, 151, 15)])
-"""Lags in degrees; a positive one lets the wave run from the rear to the front."""
-PERIOD = 2e-3
-"""Time (s) between samples of a command."""
+RUNS = [
+    *("thesis", "thesis-listing", "thesis-reversal", "cma-es"),
+    *("coulomb", "champion", "rough", "steps", "incline"),
+]
+FREQUENCIES, LAGS = np.arange(0.3, 2.6, 0.2), np.arange(15.0, 151.0, 15.0)
+"""Frequencies in Hz; lags in degrees, with which the wave runs from the rear to the front."""
+TRIED = FREQUENCIES.size * LAGS.size
 
 
-def sine(robot: Robot, *, amplitude: float, frequency: float, lag: float) -> Command:
-    """A sine on all driven cables of a robot: `amplitude` in N, `frequency` in Hz, and `lag` in
-    degrees per junction. It begins at the start-up time of the network."""
-    cpg, duration = robot.scenario.cpg, robot.scenario.simulation.duration
-    times = np.arange(0.0, duration, PERIOD)
-    junction = robot.model.cables.signal[robot.driven]
-    phase = math.tau * frequency * times[:, np.newaxis] - np.radians(lag) * junction
-    samples = amplitude * np.sin(phase) * (times >= cpg.start_up)[:, np.newaxis]
-    return Command(f"{frequency:.1f} Hz, {lag:g} degrees", PERIOD, samples)
+def oscillators(amplitude: float, *, start_up: float = 1.25) -> PhaseOscillators:
+    """Oscillators whose gaits are travelling sines of this amplitude (N)."""
+    return PhaseOscillators(
+        gain=amplitude,
+        start_up=start_up,
+        amplitude=[1.0, 1.0],
+        coupling=[5.0, 5.0],
+        common=["lag"],
+    )
+
+
+def grid(space: ParameterSpace) -> list[Vector]:
+    """Vectors of all sines in the space of such oscillators."""
+    places, vectors = [space.names.index(name) for name in ("frequency", "lag 1->2")], []
+    for frequency, lag in itertools.product(FREQUENCIES, np.radians(LAGS)):
+        vectors.append(space.low.copy())
+        vectors[-1][places] = frequency, lag
+    return vectors
 
 
 def peak(run: Run) -> float:
@@ -58,35 +69,37 @@ def peak(run: Run) -> float:
 
 def farthest(run: Run) -> dict[str, float]:
     """Numbers of the sine that moves a run's robot farthest forward."""
-    robot, amplitude = Robot.of(run.scenario), peak(run)
-    pairs = list(itertools.product(FREQUENCIES.tolist(), LAGS.tolist()))
-    commands = [sine(robot, amplitude=amplitude, frequency=f, lag=lag) for f, lag in pairs]
-    walks = simulate_many(run.scenario.on_engine("compiled"), commands)
+    amplitude, scenario = peak(run), run.scenario.on_engine("compiled")
+    cpg = oscillators(amplitude, start_up=scenario.cpg.start_up)
+    scenario = scenario.with_changes({"cpg": cpg})
+    space = ParameterSpace.of(scenario)
+    gaits = [space.gait(vector, name="sine") for vector in grid(space)]
+    walks = simulate_many(scenario, gaits)
     inches = [
         walk.metrics.distance_in if isinstance(walk, SimulationResult) else -math.inf
         for walk in walks
     ]
     best = int(np.argmax(inches))
-    frequency, lag = pairs[best]
+    numbers = gaits[best].parameters
     return {
-        "tried": len(pairs),
         "amplitude_n": round(amplitude, 3),
-        "frequency_hz": round(frequency, 1),
-        "lag_deg": lag,
+        "frequency_hz": round(numbers["frequency"], 1),
+        "lag_deg": round(math.degrees(numbers["lag 1->2"])),
         "distance_in": round(inches[best], 2),
     }
 
 
-def main() -> None:
+def main(names: Sequence[str]) -> None:
     """Writes the record and prints it."""
-    found = {name: farthest(load_run(HERE / name)) for name in RUNS}
-    write_whole(RECORD, json.dumps(found, indent=1) + "\n")
-    for name, numbers in found.items():
-        print(name, numbers)
+    found = json.loads(RECORD.read_text(encoding="utf-8"))
+    for name in names or RUNS:
+        found[name] = farthest(load_run(HERE / name))
+        write_whole(RECORD, json.dumps(found, indent=1) + "\n")
+        print(name, found[name], flush=True)
 
 
 if __name__ == "__main__":
     try:
-        main()
+        main(sys.argv[1:])
     except InputError as error:
         sys.exit(f"sine.py: {error}")

@@ -11,9 +11,9 @@ Each table is in a Markdown file between two lines:
 from __future__ import annotations
 
 import functools
+import json
 import math
 import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,8 +26,10 @@ from parting import partings
 from PIL import Image
 from readings import RECORD, load_record
 from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
+from script import run_script
+from sine import RECORD as SINES
+from sine import TRIED
 
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
@@ -227,7 +229,7 @@ def results_table(runs: Runs) -> str:
 
 def trials_table(name: str, runs: Runs) -> str:
     """Table of the fittest gait of each trial of a run, on all engines and on disturbed robots.
-    Below it, the trials with different distances on the engines."""
+    Below it, the trials with different distances on the engines, and the farthest sine."""
     run, units, rows = runs[name], scenario_of(name).units, []
     for trial, gait in run.best_gaits.iterrows():
         judged, (compiled, diagram, mujoco) = run.disturbed.loc[trial], distances_of(run, trial)
@@ -240,7 +242,8 @@ def trials_table(name: str, runs: Runs) -> str:
         }
         rows.append(row)
     apart_by = f"{rounded(APART / units.length, 1)} {units.length_word}"
-    return rendered("trials.md", rows=rows, units=units, apart_by=apart_by)
+    sine = json.loads(read_text(SINES, "record")).get(name)
+    return rendered("trials.md", rows=rows, units=units, apart_by=apart_by, sine=sine, tried=TRIED)
 
 
 def partings_table(name: str, other: str) -> str:
@@ -295,7 +298,4 @@ def main(arguments: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"tables.py: {error}")
+    run_script(main)

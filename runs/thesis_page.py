@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +19,16 @@ import pandas
 import readings
 import xarray
 from analyse import load_analysis
-from claims import claims, load_motion
+from claims import MOTION, claims
 from page import rendered
 from record import load_times
+from script import read_record, run_script
 from settle import difference_of_means, numbers
+from sine import TRIED
 from tables import aspect, best_gait
-from thesis_figures import EVOLVED, mean_fitness, save_figures
+from thesis_figures import save_figures
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import read_json, write_whole
 from tetra_drake.formatting import fixed, ranged, rounded
@@ -102,14 +103,10 @@ def weights_pattern(run: Run) -> dict[str, str]:
 
 
 def trials_numbers(run: Run) -> dict[str, Any]:
-    """Numbers of the thesis's chapter 3 from a run, as text."""
-    initial, best, fitness = run.initial(), run.best().set_index("trial"), mean_fitness(run)
-    fittest = initial.loc[initial.groupby("trial")["fitness"].idxmax()].set_index("trial")
-    begun, ended = initial.groupby("trial")["distance_in"].max(), best["distance_in"]
-    trial, last = int(best["fitness"].idxmax()), fitness.ffill().iloc[-1]
-    rise = 100.0 * (ended / fittest["distance_in"] - 1.0)
-    duration, robot = run.scenario.simulation.duration, Robot.of(run.scenario)
-    iterations = fitness.count() - 1
+    """Numbers of the thesis's chapter 3 from a run, as text; readings.py has the rest."""
+    best, duration = run.best().set_index("trial"), run.scenario.simulation.duration
+    trial, robot = int(best["fitness"].idxmax()), Robot.of(run.scenario)
+    iterations = run.iterations.groupby("trial")["iteration"].max()
     wall_time = load_times(HERE)[run.directory.name]["evolution"]["wall_s"]
     seconds = wall_time / iterations.sum()
     times = np.arange(STEADY, duration, run.scenario.simulation.sample_period)
@@ -118,25 +115,11 @@ def trials_numbers(run: Run) -> dict[str, Any]:
     pairs = pandas.DataFrame({t: two_best(run, t) for t in best.index}).T
     return {
         "trial": trial,
-        "begun": over_trials(begun),
-        "least_initial": fixed(initial["distance_in"].min()),
-        "backward": f"{100.0 * (initial['distance'] < 0.0).mean():.0f} %",
-        "ended": over_trials(ended),
-        "farthest": fixed(ended[trial]),
-        "farther": int((ended > EVOLVED).sum()),
-        "rise": over_trials(rise, 0),
-        "rise_of_means": fixed(100.0 * (ended.mean() / begun.mean() - 1.0), 0),
-        "rise_of_best": fixed(rise[trial], 0),
-        "iterations": over_trials(iterations, 0),
+        "least_initial": fixed(run.initial()["distance_in"].min()),
         "levelled": sum("levelled" in str(status.stop) for status in run.statuses),
-        "mean_begun": over_trials(fitness.iloc[0]),
-        "mean_ended": over_trials(last),
-        "rising": int((last > fitness.iloc[0]).sum()),
-        "last_rise": fixed(last[trial] - fitness[trial].dropna().iloc[-101]),
         "seconds": rounded(seconds, 2),
         "faster": f"{round(2.0 * duration / seconds, -2):,.0f}",
         "trial_seconds": over_trials(seconds * iterations, 0),
-        "tau": over_trials(best["tau_A"], 3),
         "hertz": over_trials(hertz),
         "hertz_of_best": fixed(hertz[trial]),
         "swing": fixed(np.ptp(signals[trial]) / POUND_FORCE),
@@ -191,12 +174,12 @@ def motions(run: Run, engine: str) -> list[xarray.DataArray]:
 def motion_errors(run: Run, engines: Iterable[str]) -> list[str]:
     """Greatest error (in) of a node's place on each engine beside a fine one, over the best gaits
     of a run."""
-    exact, texts = motions(run, FINE), []
-    for engine in engines:
-        pairs = zip(motions(run, engine), exact, strict=True)
-        errors = [float(abs(rough - fine).max()) / INCH for rough, fine in pairs]
-        texts.append(over_trials(pandas.Series(errors)))
-    return texts
+    exact, *others = (motions(run, engine) for engine in (FINE, *engines))
+    errors = [
+        [float(abs(a - b).max()) / INCH for a, b in zip(each, exact, strict=True)]
+        for each in others
+    ]
+    return [over_trials(pandas.Series(each)) for each in errors]
 
 
 def widths(*pictures: str) -> list[int]:
@@ -243,22 +226,23 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
         former=trials_numbers(load_run(FORMER)),
-        sines=sines,
+        tried=TRIED,
         sine=lambda name: fixed(sines[name]["distance_in"]),
         setting=setting,
         reached=reached,
         apart=apart,
         widths=widths,
         number=fixed,
+        over=over_trials,
         readings=readings,
         **simulated,
         trials=tables,
         read={name: readings.results(trials) for name, trials in tables.items()},
-        claims=claims(load_motion()).markdown(),
+        claims=read_record(MOTION, claims, "claims.py").markdown(),
     )
 
 
-def main() -> None:
+def main(_: Sequence[str] = ()) -> None:
     """Writes the page and the figures."""
     run = load_run(HERE / "thesis")
     save_figures(run, FIGURES)
@@ -267,7 +251,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except InputError as error:
-        sys.exit(f"thesis_page.py: {error}")
+    run_script(main)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import io
 import itertools
+import json
 import os
 import shlex
 import sys
@@ -48,6 +50,12 @@ FAILED, INTERRUPTED = 1, 130  # exit statuses beside BAD_INPUT
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command with arguments `argv`, by default the process's. Returns the exit status."""
+    for name in ("stdout", "stderr"):
+        # A shell may have closed it.
+        stream = getattr(sys, name) or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+        setattr(sys, name, stream)
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     command, options = make_parser().call_of(argv)
     units = options.pop("units")
     try:
@@ -341,7 +349,10 @@ def _schema(*, structure: bool = False) -> None:
     """
     from tetra_drake.scenario.keys import schema_text
 
-    print(schema_text(structure=structure), end="")
+    text = schema_text(structure=structure)
+    if "utf" not in (sys.stdout.encoding or "utf").lower():
+        text = json.dumps(json.loads(text), indent=1) + "\n"
+    print(text, end="")
 
 
 def _prepare() -> None:

@@ -55,10 +55,13 @@ class InputError(ValueError):
 
 
 def _one_line(text: str) -> str:
-    """The text on one line: runs of spaces and line feeds become one space. Control characters are
-    escaped, because a terminal would obey them."""
-    line = " ".join(text.split())
-    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in line)
+    """The text on one line: runs of spaces and line feeds become one space; see escaped()."""
+    return escaped(" ".join(text.split()))
+
+
+def escaped(text: str) -> str:
+    """The text with escapes in place of control characters, because a terminal would obey them."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 def _cut(text: str, length: int) -> str:

@@ -22,7 +22,7 @@ from tetra_drake.evolution.evaluators import (
 )
 from tetra_drake.evolution.manifest import Method, RunRecord, read_manifest
 from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.evolution.run import Run, load_run, tell_code
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
 from tetra_drake.files import given_path
 from tetra_drake.machine import available_cores
@@ -116,6 +116,7 @@ def evolve(
 
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
     if resume:
+        tell_code(scenario, out)
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
         record = RunRecord.create(

@@ -189,10 +189,11 @@ def read_bytes(path: str | Path, what: str, *, most: int = MOST_BYTES) -> bytes:
     """
     content = b""
     try:
-        mode = os.stat(path).st_mode
+        about = os.stat(path)
+        mode = about.st_mode
         if stat.S_ISREG(mode):  # opening a pipe would wait for a writer
-            with open(path, "rb") as file:
-                content = file.read(most + 1)
+            with open(path, "rb") as file:  # Python reserves memory for what it is to read
+                content = file.read(min(most, about.st_size) + 1)
     except FileNotFoundError as error:
         raise InputError(path, "", f"no such {what}") from error
     except (OSError, ValueError) as error:

@@ -51,7 +51,9 @@ class Parser(argparse.ArgumentParser):
         commands = self.add_subparsers(metavar="COMMAND", required=True)
         for function in functions:
             name = function.__name__.removeprefix("_")
-            what, description, about, example = (inspect.getdoc(function) or "").split("\n\n")
+            # Without docstrings (python -OO) there is no help.
+            parts = (inspect.getdoc(function) or "\n\n" * 3).split("\n\n")
+            what, description, about, example = parts
             command = commands.add_parser(
                 name,
                 help=what.rstrip("."),

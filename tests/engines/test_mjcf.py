@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from helpers.structures import unit_inertias
@@ -10,9 +12,18 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.engines.mjcf import make_mjcf
+from tetra_drake.lab.bridges.conversion import converted
 from tetra_drake.lab.bridges.sdf import make_sdf
-from tetra_drake.lab.study.equilibrium import EquilibriumStudy, robot_of_file, study_equilibrium
+from tetra_drake.lab.study.equilibrium import (
+    EquilibriumStudy,
+    robot_of_file,
+    robot_of_structure,
+    study_equilibrium,
+)
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.systems import AddCables
 from tetra_drake.systems.diagram import cables_of
 
@@ -68,3 +79,42 @@ def test_drake_has_the_bodies_of_the_sdf_and_its_cables_the_tensions_at_rest(stu
     here = network.GetMyContextFromRoot(diagram.CreateDefaultContext())
     tensions = network.GetOutputPort("tensions").Eval(here)
     np.testing.assert_allclose(tensions, study.cables["tension"], rtol=1e-6, atol=1e-9)
+
+
+def renamed(tree: Any, old: str, new: str) -> Any:
+    if isinstance(tree, dict):
+        return {renamed(key, old, new): renamed(one, old, new) for key, one in tree.items()}
+    if isinstance(tree, list):
+        return [renamed(one, old, new) for one in tree]
+    words = tree.split(" ") if isinstance(tree, str) else []
+    return " ".join(new if word == old else word for word in words) or tree
+
+
+@pytest.mark.parametrize("name", ["x--><worldbody/><!--", "a-", "floor", '<&">', "ü", "strut"])
+@pytest.mark.parametrize("old", ["side", "n0"])
+def test_mujoco_and_drake_read_what_is_written_with_any_name(old, name, tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    tree = renamed(load_scenario("prism").robot.model_dump(), old, name)
+    study = study_equilibrium(robot_of_structure(StructureFile.from_tree(tree, "a"), "a"))
+    file = tmp_path / "a.xml"
+    file.write_text(make_mjcf(study.robot), "utf-8")
+    assert mujoco.MjModel.from_xml_path(str(file)).ntendon == 9
+    assert sum(len(group.pairs) for group in converted(file).cables.values()) == 9
+    plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), 0.0)
+    text = make_sdf(study.robot.structure, study.robot.equilibrium.state, name="a")
+    Parser(plant).AddModelsFromString(text, "sdf")
+    assert plant.HasFrameNamed(f"node {study.robot.structure.node_names[0]}")
+
+
+def test_names_that_other_software_reserves_are_refused(refused):
+    def robot(new: str) -> Robot:
+        tree = renamed(load_scenario("prism").robot.model_dump(), "bar", new)
+        return robot_of_structure(StructureFile.from_tree(tree, "a"), "a")
+
+    def text_of(robot: Robot) -> str:
+        return make_sdf(robot.structure, robot.equilibrium.state, name="a::b")
+
+    with refused("a::b", "robot", "SDFormat"):
+        text_of(robot("bar"))
+    with refused("a", "", "control character"):
+        robot("\x1b")

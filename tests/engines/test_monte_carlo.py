@@ -11,20 +11,17 @@ from tetra_drake.engines.drake import MakeDisturbedSimulator
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
+from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import load_scenario
 
-VARIED = {
-    "disturbances": {
-        "draws": 1,
-        "start": 0.05,
-        "spreads": {"robot.cables.outer_stiffness": 0.2, "robot.density": 0.3},
-    }
-}
+SPREADS = {"robot.cables.outer_stiffness": 0.2, "robot.density": 0.3}
 
 
 @pytest.fixture(scope="module")
 def scenario():
-    return shortly(load_scenario("coulomb"), 0.3).with_changes(VARIED)
+    return shortly(load_scenario("coulomb"), 0.3).with_sections(
+        disturbances=Disturbances(draws=1, start=0.05, spreads=SPREADS)
+    )
 
 
 @pytest.fixture(scope="module")

@@ -95,17 +95,12 @@ def test_each_feedback_changes_the_signals_and_gains_of_zero_do_not(scenario):
         assert np.abs(felt - without).max() > 1e-3, "more than engines may differ by"
 
 
-def test_a_constant_number_steers_as_the_gaits_turn_does(refused):
+def test_a_constant_number_steers_as_the_gaits_turn_does():
     short = shortly(load_scenario("turning"), 0.4, engine="!Compiled")
     gait = dataclasses.replace(seeded_gait(short), turn=0.0)
     turned = simulate(scenario=short, gait=dataclasses.replace(gait, turn=0.5))
     for turn in (0.5, np.float64(0.5)):
         assert simulate(scenario=short, gait=gait, steering=turn).metrics == turned.metrics
-    for wrong in ("left", True, [0.5]):
-        with refused("steering", "", repr(wrong)):
-            simulate(scenario=short, gait=gait, steering=wrong)
-    with refused("steering", "at 0 s", "1.5"):
-        simulate(scenario=short, gait=gait, steering=1.5)
 
 
 def test_one_gait_walks_straight_on_and_turns_either_way(data):

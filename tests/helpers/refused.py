@@ -18,7 +18,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 import tetra_drake as td
 from helpers.actuations import WINCH
-from helpers.anchored import HUNG, scenario_of
+from helpers.anchored import HUNG, SWINGING, scenario_of
 from helpers.brief import BRIEF
 from helpers.controllers import OwnGround, Springs
 from helpers.converged import shortly
@@ -33,6 +33,7 @@ from tetra_drake.lab.fit.fit import fit
 from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.lab.linearization.linearization import linearize
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.lab.study.sweep import sweep
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.contact import MODE_COLUMNS, GroundSection, NormalForce

@@ -6,7 +6,6 @@ import io
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import gallery
 import numpy as np
 import pytest
 from helpers import quick_figures
@@ -145,14 +144,6 @@ def test_a_video_has_its_size_rate_and_speed(browser, replay, tmp_path, name, vi
     about, *frames = reader(str(tmp_path / name))
     assert about["size"] == (320, 180) and about["fps"] == pytest.approx(10.0)
     assert len(frames) == 5 and frames[0] != frames[-1]
-
-
-@pytest.mark.skipif(not (RUNS / "champion").exists(), reason="as in a source distribution")
-def test_the_gallery_opens_replays(browser, tmp_path):
-    gallery.save_gallery(tmp_path, ["champion"])
-    with opened(browser, (tmp_path / "index.html").as_uri()) as page:
-        page.locator("a[href='champion/replay.html']").click()
-        wait_until_loaded(page)
 
 
 def test_a_page_without_its_viewer_says_how_to_get_it(browser, trajectory, tmp_path):

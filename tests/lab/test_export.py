@@ -10,7 +10,6 @@ from helpers.actuations import ACTUATIONS, FORCE, MOTOR
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError
 from tetra_drake.lab.prototype.export import COMMAND, EXPECTED, LIMITS_FILE, README, export
 from tetra_drake.laws.actuator import LimitedActuator, Winch
 from tetra_drake.robot.command_file import load_command
@@ -114,15 +113,6 @@ def test_a_gait_with_feedback_is_exported_as_it_walked_once(tmp_path):
     played = simulate(scenario=scenario, command=command, record=True).trajectory
     walked = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
     assert np.abs(played.p_WN.values - walked.p_WN.values).max() < 2e-3
-
-
-def test_what_cannot_be_exported_leaves_nothing(short, tmp_path, refused):
-    with refused(tmp_path, "", "exists"):
-        export(short, seeded_gait(short), rate=100.0, out=tmp_path)
-    smaller = short.with_changes({"robot.tetrahedra": 3})
-    with pytest.raises(InputError):
-        export(smaller, seeded_gait(short), rate=100.0, out=tmp_path / "new" / "lab")
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_command_is_played_on_the_scenario_beside_it(short, tmp_path, monkeypatch, capsys):

@@ -345,8 +345,11 @@ def test_a_frame_that_is_given_is_taken(lab, truth, tmp_path):
 
 
 def test_the_offset_of_a_marker_is_found_in_the_axes_of_its_body(lab, truth, tmp_path):
-    capture = seen_by_cameras(tmp_path / "log.csv", lab, **TURNED, along=0.03, marker_offset=0.01)
-    offsets = predicted(capture, truth, markers=6, within=2e-5).values[-18:].reshape(6, 3)
+    moved = {"along": 0.03, "marker_offset": 0.01}
+    capture = seen_by_cameras(tmp_path / "log.csv", lab, **TURNED, ahead=12.3, **moved)
+    found = predicted(capture, truth, markers=6, within=2e-5)
+    assert found.clock_offset == pytest.approx(12.3, abs=2e-5)
+    offsets = found.values[-18:].reshape(6, 3)
     p_WN = np.load(lab / "all.npy")[0]
     expected = 0.03 * np.linalg.norm(p_WN[-2] - p_WN[-1])
     assert np.linalg.norm(offsets, axis=1) == pytest.approx([0.0] * 5 + [expected], abs=4e-4)

@@ -233,6 +233,7 @@ def test_a_regulator_damps_the_slow_swing_of_a_load_on_a_long_rope():
     tree = copy.deepcopy(TREES["load"])
     tree["nodes"]["hook"], tree["masses"]["load"] = [0, 0, long], mass
     tree["cables"]["rope"]["tension"] = mass * 9.80665
+    tree["cables"]["guy"]["tension"] = 1e-3  # hardly any, beside the weight
     linear = linearize(scenario_of(tree))
 
     gain = linear.lqr(np.eye(12), cost * np.eye(2))
@@ -296,9 +297,6 @@ def test_the_page_shows_one_mode_with_damping(tmp_path):
     assert set(film["progress"]["values"]) == {study.damped.frequencies[1]}
     poses = film["resolution"] * np.cumsum(film["poses"], axis=1).reshape(3, 7, -1)
     assert 0.005 < np.ptp(poses[:, :3], axis=2).max() < 0.05
-    with pytest.raises(InputError) as caught:
-        save_structure_page(study, tmp_path / "none.html", mode=10)
-    assert (caught.value.key, (tmp_path / "none.html").exists()) == ("mode", False)
 
 
 PRISM = "prism"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -239,6 +240,7 @@ def test_without_mujoco_the_error_says_how_to_install_it(monkeypatch, tmp_path, 
 @pytest.mark.parametrize(("text", "key", "fact"), ROWS["refused"])
 def test_other_files_are_refused_in_one_line(text, key, fact, tmp_path, refused) -> None:
     (tmp_path / "a.xml").write_text(text)
+    os.mkfifo(tmp_path / "pipe.stl")
     with refused(tmp_path / "a.xml", key, fact):
         converted(tmp_path / "a.xml")
 

@@ -185,10 +185,10 @@ def test_a_file_needs_a_unit_and_substructures_their_files(tmp_path: Path, refus
     file = DATA / "ntrt/prism.yaml"
     with refused(file, "unit", "missing"):
         converted(file)
-    for name in ("prims", "nul\0"):
+    for name, told in (("prims", "prims"), ("nul\0", "parts.yaml")):
         part = f"substructures: {{part: {{path: {json.dumps(name)}}}}}"
         parts = write(tmp_path, part, "parts.yaml")
-        with refused(tmp_path / name, "", ""):
+        with refused(tmp_path / told, "", ""):
             converted(parts, unit="m")
 
 

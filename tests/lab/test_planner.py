@@ -117,6 +117,7 @@ def test_a_plan_stays_while_all_samples_fail(hung):
     planner = Planner(hung.with_changes({"simulation.max_speed": "1 um/s"}), UP, **SMALL)
     readings = Simulation(hung, control_period=0.01).step([[0.8]]).rows(0)
     first = planner(float(readings.time), readings)
-    assert not planner.costs and planner.decisions == 1 and np.isfinite(first).all()
+    assert np.isnan(planner.costs).all() and planner.lost == planner.decisions == 1
+    assert np.isfinite(first).all() and "1 without a result" in str(planner)
     later = readings._replace(time=readings.time + 0.05)
     assert np.isfinite(planner(float(later.time), later)).all()

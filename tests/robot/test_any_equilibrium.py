@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers import joined
-from helpers.anchored import BAR, HUNG, SWINGING, floating_prism, scenario_of, supported_prism
+from helpers.anchored import BAR, HUNG, floating_prism, scenario_of, supported_prism
 
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.lab.study.equilibrium import robot_of_file
@@ -136,19 +136,6 @@ def test_a_heavy_structure_rests_on_its_own_struts():
     memory, pushes = Forces.of(robot.model), np.empty(18)
     compute_state_forces(Packed((robot.model, memory)), robot.structure.initial_state, pushes)
     assert pushes.any() and np.ptp(heights) < 0.1
-
-
-UNHELD = [
-    ({**HUNG, "cables": {}, "anchors": {}, "nodes": SWINGING["nodes"]}, "0, 0, -"),
-    ({**SWINGING, "anchors": {"a": "yz"}, "loads": {"b": [0.3, 0.0, 0.0]}}, "0.3, 0, 0"),
-    ({**SWINGING, "anchors": {}, "loads": {"b": [0.0, 0.0, 9.0]}}, "0, 0, 8."),
-]
-
-
-@pytest.mark.parametrize(("tree", "force"), UNHELD)
-def test_what_nothing_holds_is_told(tree, force, refused):
-    with refused("anchored", "robot", f"nothing holds it against the force [{force}"):
-        Robot.of(scenario_of(tree))
 
 
 def changes(resting: Unactuated, state: np.ndarray, size: float) -> Iterator[list[np.ndarray]]:

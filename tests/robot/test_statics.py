@@ -85,13 +85,3 @@ def test_the_shipped_spines_balance_without_weight(name: str) -> None:
     tensions = laws[:, 0] * (np.linalg.norm(spans[:, 1] - spans[:, 0], axis=1) - laws[:, 1])
     assert tensions.min() > 1.0
     assert np.abs(forces_on_bodies(joined, tensions)).max() < 0.02 * tensions.min()
-
-
-def test_the_six_cables_of_the_thesis_balance_where_its_spacing_says() -> None:
-    robot = load_scenario("thesis").robot
-    (tensions,) = find_statics(**nested_tetrahedra(robot.spacing)).self_stresses
-    outer, inner = tensions[0], tensions[3]
-    assert tensions == pytest.approx([outer] * 3 + [inner] * 3, rel=1e-9)
-    reach = robot.strut_length * math.sqrt(2.0 / 3.0) - robot.spacing
-    slant = math.hypot(reach, robot.strut_length / math.sqrt(3.0))
-    assert outer == pytest.approx(inner * reach / slant)

@@ -32,7 +32,7 @@ def test_trials_turn_to_the_side_of_the_map_that_still_walks_and_end():
     tried = [int(np.argmax(before * (places[:, 2] < 0.5)))]
     while (following := damage.next_trial(places, before, tried, after[tried])) is not None:
         tried.append(following)
-    assert len(tried) < damage.TRIALS and after[tried].max() > 0.9 * after.max()
+    assert len(tried) < damage.SET["trials"] and after[tried].max() > 0.9 * after.max()
 
 
 def test_a_strong_trial_pulls_harder_in_the_same_rhythm_without_the_cable():

@@ -15,7 +15,7 @@ def test_an_interrupted_script_runs_what_is_left_and_writes_its_page(tmp_path, m
     short = {"samples": 4, "horizon": 0.5, "knots": 2}
     monkeypatch.setattr(planning, "PLANNING", planning.PLANNING | short)
     ways = [
-        planning.Way([(0.0, 0.0)], planning.EPISODES["slalom"]["pillars"]),
+        planning.Way([(0.0, 0.0)], planning.EPISODES["courses"]["slalom"]["pillars"]),
         planning.Way([(3.0, 0.0)]),
     ]
     groups, episodes = ("courses", "goals, MuJoCo"), []

@@ -71,21 +71,13 @@ def test_numbers_beyond_floats_and_depths_without_end(folder, refused):
             load_scenario(folder / "deep.yaml")
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "key", "fact"),
-    [
-        ("stiffness: 2 N/cm, ", "", "cables.side.stiffness", "is missing; give it"),
-        ("[c, d]]", "[c, x]]", "cables.side.pairs[1]", "'x'"),
-        ("unit: cm", "unit: [", "", "YAML"),
-        ("unit: cm", "", "nodes.g[0]", "unit"),
-    ],
-)
-def test_a_fault_of_a_structure_file_names_that(old, new, key, fact, folder, refused):
+@rows("structure files")
+def test_of_the_file_of_a_structure(base, changes, key, words, folder, refused):
     own, mine = folder / "own.yaml", folder / "mine.yaml"
-    own.write_text(SMALL.replace(old, new))
+    own.write_text(SMALL.replace(*changes))
     text = "robot: !Structure {file: own.yaml, cables: {side: {stiffness: 1 N/m}}}"
-    mine.write_text(f"base: thesis\nobjective: {{speed: 1 s/m}}\n{text}\n")
-    with refused(own, key, fact):
+    mine.write_text(f"base: {base}\nobjective: {{speed: 1 s/m}}\n{text}\n")
+    with refused(own, key, *words):
         load_scenario(mine)
 
 

@@ -79,18 +79,12 @@ def test_a_changed_parameter_changes_the_forces_at_once(robots):
     """Also one that is set by Drake's own functions."""
     diagram = diagram_of(robots[0], parameters=True)
     context, cables = moving(diagram), diagram.GetSubsystemByName("cables")
-    before = diagram.GetOutputPort("tensions").Eval(context)
     own = cables.GetMyMutableContextFromRoot(context)
     law = cables.GetLaw(own)
-    cut = law._replace(
-        stiffness=np.append(0.0, law.stiffness[1:]),
-        damping=np.append(0.0, law.damping[1:]),
-        intact=np.append(0.0, law.intact[1:]),
-    )
-    cables.SetLaw(own, cut)
+    before = diagram.GetOutputPort("tensions").Eval(context)
+    cables.SetLaw(own, law._replace(stiffness=np.append(9.0, law.stiffness[1:])))
     after = diagram.GetOutputPort("tensions").Eval(context)
-    assert before[0] != 0.0 and after[0] == 0.0
-    np.testing.assert_array_equal(after[1:], before[1:])
+    assert (after != before).tolist() == [True] + [False] * 23
     own.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(law[:-1]))
     np.testing.assert_array_equal(diagram.GetOutputPort("tensions").Eval(context), before)
 

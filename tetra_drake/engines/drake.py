@@ -131,6 +131,9 @@ class _DiagramRobot:
     def _build(self, robot: Robot) -> None:
         """Makes the diagram of a robot, and what follows its simulation."""
         driven, settings = self._driven, robot.scenario.settings_of(Drake)
+        if robot.scenario.events:  # _become() plays them
+            until = robot.scenario.with_sections(events=[])
+            robot = dataclasses.replace(robot, scenario=until)
         if (gait := driven.oscillating) is not None:
             diagram = MakeTensegrityDiagram(robot, gait, steering=driven.steering)
         elif driven.pilot is not None:
@@ -250,12 +253,15 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     """Drake's Simulator for a robot's diagram, with the integrator settings of the scenario.
 
     If the scenario sets no target accuracy, it is half of Robot.damping_ratio, but at least 2e-5
-    and at most 5e-3, or 1e-2 where friction is nearly viscous. If it sets no longest step,
-    Robot.longest_step limits it.
+    and at most 5e-3, or 1e-2 where friction is nearly viscous; a tenth of this for robots with
+    joints. If it sets no longest step, Robot.longest_step limits it.
 
     The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
     monitor replaces it.
     """
+    check_type("MakeSimulator", "diagram", diagram, Diagram)
+    check_type("MakeSimulator", "robot", robot, Robot)
+    check_type("MakeSimulator", "settings", settings, Drake)
     steps = _Steps.of(robot, settings)
     simulator = _make_simulator(diagram, robot, steps)
     aimer = _StepAimer(diagram, simulator, steps, _Work(simulator))
@@ -300,8 +306,6 @@ def MakeDisturbedSimulator(
     if scenario.disturbances is None:
         raise InputError(scenario.name, "disturbances", "is missing; it says what varies")
     [draw] = fresh_draws(scenario, generator(), 1)
-    if scenario.events or draw.events:
-        raise InputError(scenario.name, "events", "found some; only td.simulate() knows them")
     robot = Robot.of(disturbed(scenario, draw))
     return MakeSimulator(MakeTensegrityDiagram(robot, gait), robot, scenario.settings_of(Drake))
 
@@ -322,18 +326,19 @@ class _Steps:
     def of(cls, robot: Robot, settings: Drake) -> _Steps:
         """The steps of a robot; see MakeSimulator()."""
         pace = _VISCOUS if robot.scenario.friction.is_viscous else _SLIPPING
-        accuracy = min(pace.coarsest, max(_FINEST, 0.5 * robot.damping_ratio))
+        is_jointed = robot.model.joints.node_a.size > 0
+        coarsest = 0.1 * pace.coarsest if is_jointed else pace.coarsest
+        accuracy = min(coarsest, max(_FINEST, 0.5 * robot.damping_ratio))
         longest = settings.max_step or min(pace.max_step, robot.longest_step)
         pace = pace._replace(max_step=longest)
         if settings.look_ahead is not None:
             pace = pace._replace(look_ahead=settings.look_ahead)
-        is_held = robot.model.anchors.nodes.size + robot.model.joints.node_a.size > 0
         return cls(
             scheme=settings.scheme or default_scheme(robot),
             accuracy=settings.accuracy or accuracy,
             at_step_end=settings.mode_changes == "step_end",
             pace=pace,
-            renewal=_RENEWAL if is_held else math.inf,
+            renewal=_RENEWAL if is_jointed or robot.model.anchors.nodes.size else math.inf,
         )
 
 

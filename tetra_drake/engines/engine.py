@@ -6,13 +6,13 @@ import contextlib
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.on_demand import loaded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import driven_robot
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.world import World
+from tetra_drake.settings.plugins import part_of
 
 if TYPE_CHECKING:
     import xarray
@@ -80,7 +80,7 @@ class Engine:
 
 def engine_of(scenario: World) -> Engine:
     """Engine that the scenario's setting `engine` names. Its module is imported on demand."""
-    engine: Engine = loaded(f"{scenario.engine.module}:ENGINE")
+    engine: Engine = part_of(scenario.engine, "ENGINE")
     return engine
 
 

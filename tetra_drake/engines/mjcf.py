@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from xml.etree.ElementTree import Comment, Element
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
@@ -27,7 +27,7 @@ from tetra_drake.robot.structure import (
     Structure,
     rotated,
 )
-from tetra_drake.robot.xml_elements import add_element, xml_text
+from tetra_drake.robot.xml_elements import add_comment, add_element, xml_text
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.events import up_to_each
 from tetra_drake.scenario.world import World
@@ -94,7 +94,7 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     contact = {"cone": "elliptic", "impratio": _IMPRATIO}
     add_element(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
     if not pulled and (remark := loose_remark(robot)):
-        model.append(Comment(f" {remark} "))
+        add_comment(model, remark)
     world = add_element(model, "worldbody")
     if scenario.terrain.is_ground:
         slope = scenario.terrain.plane_slope or 0.0
@@ -116,7 +116,20 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     _add_cables(model, robot, pulled=pulled)
     _add_joints(model, structure, step=step)
     _add_pushes(model, world, structure)
+    _check_names(model, scenario.name)
     return xml_text(model)
+
+
+def _check_names(model: Element, source: str) -> None:
+    """Raises InputError, naming `source`, for a name that MuJoCo refuses: two things of a kind may
+    not have it, and a body may not be the world."""
+    seen = {("body", "world")}
+    for element in model.iter():
+        kind = "actuator" if element.tag in ("motor", "general") else element.tag
+        if (name := element.get("name")) is not None:
+            if (kind, name) in seen:
+                raise InputError(source, "robot", f"mujoco cannot have another {kind} '{name}'")
+            seen.add((kind, name))
 
 
 def is_pulled(robot: Robot) -> bool:
@@ -194,8 +207,9 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
             add_element(body, "site", name=name, pos=p_BN, size=radii[node], rgba=NODE_COLOUR)
             if node in structure.contacts:
                 size = structure.contact_radius[node] + _POINT
-                add_element(body, "geom", name=name, pos=p_BN, size=size, **_ALONE)
-                add_element(pairs, "pair", geom1="floor", geom2=name, **contact)
+                foot = f"foot {name}"
+                add_element(body, "geom", name=foot, pos=p_BN, size=size, **_ALONE)
+                add_element(pairs, "pair", geom1="floor", geom2=foot, **contact)
         for strut in np.flatnonzero(structure.carriers[structure.struts[:, 0]] == i):
             ends = structure.p_BN[structure.struts[strut]]
             size = structure.strut_radius[strut]
@@ -254,7 +268,7 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
     struts.
     """
     normal = NormalForce(*robot.model.strut_contact.normal)
-    model.append(Comment(f" the struts' damping is right for impacts at {_IMPACT_SPEED:g} m/s "))
+    add_comment(model, f"the struts' damping is right for impacts at {_IMPACT_SPEED:g} m/s")
     bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
     pairs, friction = add_element(model, "contact"), [_LEAST_FRICTION, _LEAST_FRICTION, 0, 0, 0]
     places = robot.structure.places[robot.structure.struts]

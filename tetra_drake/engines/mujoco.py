@@ -342,7 +342,7 @@ class _MujocoRobot:
         mujoco, model, data = self._mujoco, self._model, self._mujoco.MjData(self._model)
         ground, structure = self._robot.ground, self._robot.structure
         names = [structure.node_names[node] for node in structure.contacts]
-        contact_of_geom = {model.geom(name).id: i for i, name in enumerate(names)}
+        contact_of_geom = {model.geom(f"foot {name}").id: i for i, name in enumerate(names)}
         sites, wrench = [model.site(name).id for name in names], np.zeros(6)
         ground_forces = np.zeros((len(times), len(names), 3))  # along t1, t2 and n
         for row, state in enumerate(states):

@@ -275,9 +275,8 @@ class Simulation:
                 if self._steps[place] == 0:
                     self._begin(place, self._driven(self._robots[place]))
             tables = self._batch.save(which, history=history)
-            recent = [self._sensors[place].recent for place in which if self._sensors]
-            for name in Readings._fields if recent else ():
-                rows = [[getattr(readings, name) for readings in own] for own in recent]
+            for name in Readings._fields if self._sensors else ():
+                rows = [[getattr(one, name) for one in self._sensors[k].recent] for k in which]
                 tables[f"sensors.{name}"] = np.array(rows)
             return States(
                 scenario=self.scenario.name,
@@ -318,6 +317,10 @@ class Simulation:
             name: np.broadcast_to(table, (count, *table.shape[1:]))
             for name, table in states.tables.items()
         }
+        for name, table in {**self._batch.save([0], history=False), "pause": np.zeros(1)}.items():
+            given = states.tables.get(name, np.zeros(0))
+            if (given.dtype, given.shape) != (table.dtype, (len(states), *table.shape[1:])):
+                raise InputError("Simulation", f"states.{name}", "is no table of states")
         identities = states.robots * (count // len(states) if len(states) else 0)
         steps = self._steps_until(own["pause"])
         with self._used("restore"):

@@ -153,7 +153,8 @@ class GaitEvaluation:
         settings, evaluation = self.scenario.disturbances, draws[0]
         if settings is not None and task.seed is not None:
             evaluation = combine(draws, settings.tail)
-        return dataclasses.replace(evaluation, engine=self.scenario.engine_name)
+        engine = self.scenario.engine_name
+        return dataclasses.replace(evaluation, engine=engine, task=str(task))
 
     def _fitness(self, result: SimulationResult) -> float:
         if self.objective is None:

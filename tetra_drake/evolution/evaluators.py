@@ -25,7 +25,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any, Union
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.formatting import Say
 from tetra_drake.machine import available_cores
 from tetra_drake.on_demand import loaded
@@ -113,6 +113,7 @@ def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterato
     BrokenExecutor. A task for an executor that is broken or shut down raises InputError.
     """
     executor, is_done = make(workers), False
+    check_type("evolve", "executor", executor, Executor)
     running: set[Future[Evaluation]] = set()
 
     def submit(task: Task) -> Future[Evaluation]:
@@ -121,6 +122,8 @@ def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterato
         except RuntimeError as error:
             problem = f"takes no more tasks; the run can be resumed: {error}"
             raise InputError("executor", "", problem) from error
+        if not isinstance(future, Future):
+            raise InputError("executor", "", f"submit() gave {future!r:.60}, expected a Future")
         running.add(future)
         future.add_done_callback(running.discard)
         return future
@@ -220,7 +223,7 @@ def finished(
     dask = sys.modules.get("distributed")
     died = (BrokenExecutor, *([dask.KilledWorker] if dask else []))
     try:
-        return [(running.pop(future), future.result()) for future in evaluated or done]
+        return [_of_task(running.pop(future), future.result()) for future in evaluated or done]
     except futures.CancelledError as error:
         problem = "has dropped evaluations, as if its scheduler had ended; the run can be resumed"
         raise InputError("executor", "", problem) from error
@@ -228,6 +231,14 @@ def finished(
         cause = f"it may be that memory is short, or that {_UNGUARDED}"
         problem = f"do not start or have died, as they may say above; {cause}"
         raise InputError(_SOURCE, "", f"{problem}; a run can be resumed") from error
+
+
+def _of_task(task: Task, found: Any) -> tuple[Task, Evaluation]:
+    """A task with its evaluation. Raises InputError if an executor gave something else."""
+    if not isinstance(found, Evaluation) or found.task not in ("", str(task)):
+        problem = f"found {found!r:.60}, expected the evaluation of {task}"
+        raise InputError("executor", "", problem)
+    return task, found
 
 
 def evaluate_all(submit: Submit, tasks: Iterable[Task]) -> Iterator[tuple[Task, Evaluation]]:

@@ -243,6 +243,7 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
             scenario, seed, installed, method, name, reevaluate=reevaluate, units=chosen_units()
         )
         check_folder(directory)
+        _recover(directory)
         problem = _why_not_new(directory)
         if not problem:
             return cls(directory, manifest)
@@ -263,6 +264,7 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
         """Opens a run to continue it. A given scenario, seed or method must be equal to the run's.
         Raises InputError if one is not, if most genomes were removed from the run (thinned), or if
         another process is working on it."""
+        _recover(directory)
         manifest = read_manifest(directory)
         if manifest.thinned:
             raise InputError(directory, "", "is thinned: it lacks genomes that resuming needs")
@@ -305,8 +307,7 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
                 file.rename(aside / file.name)
             write_manifest(self.directory, self.manifest)
         except BaseException:
-            for file in aside.iterdir():
-                file.replace(self.directory / file.name)
+            _put_back(self.directory)
             raise
         finally:
             shutil.rmtree(aside)
@@ -315,6 +316,19 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
     def __exit__(self, *_: object) -> None:
         if self._lock is not None:
             self._lock.close()
+
+
+def _recover(directory: Path) -> None:
+    """Puts a run back that a process was about to overwrite when it was killed."""
+    if (directory / _ASIDE / MANIFEST).exists() and not (directory / MANIFEST).exists():
+        with _locked(directory):
+            _put_back(directory)
+
+
+def _put_back(directory: Path) -> None:
+    """Moves the files of a run back that begin() has moved aside, the manifest last."""
+    for file in sorted((directory / _ASIDE).iterdir(), key=lambda one: one.name == MANIFEST):
+        file.replace(directory / file.name)
 
 
 def _why_not_new(directory: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 from collections.abc import Mapping
@@ -311,6 +312,9 @@ def _check_iterations(
                 file.refuse(row, f"{problem}; {REMEDY}")
 
 
+_LOG = logging.getLogger("tetra_drake")
+
+
 @dataclass(frozen=True)
 class GaitSource:
     """Gaits of a file or a run, and the scenario to simulate them on."""
@@ -342,6 +346,7 @@ def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent
         chosen = load_scenario(scenario or "thesis")
     else:
         chosen = read_manifest(folder).scenario
+        tell_code(chosen, folder)
     if os.path.isdir(source):
         run = load_run(source)
         best, trials, spread = run.best_gait(), run.best()["trial"], run.spread_of(run.fittest())
@@ -353,6 +358,12 @@ def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent
         made = f"made for scenario {best.scenario}"
         warn(f"{source}: {made}, simulated on scenario {chosen.name}")
     return GaitSource(chosen, best, gaits, spread)
+
+
+def tell_code(scenario: Scenario, folder: Path) -> None:
+    """Tells in the log which code a simulation of a recorded scenario runs."""
+    if scenario.policy is not None and scenario.policy.code:
+        _LOG.warning("%s: its policy runs the Python function %s", folder, scenario.policy.code)
 
 
 def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:

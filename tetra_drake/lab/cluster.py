@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import logging
 from collections.abc import Iterator
 from importlib import metadata
@@ -14,6 +15,8 @@ from tetra_drake.machine import available_cores, check_package
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
+
+_LOG = logging.getLogger("tetra_drake")
 
 
 @contextlib.contextmanager
@@ -68,6 +71,12 @@ def local_cluster(workers: int) -> LocalCluster:
     import dask
     from distributed import LocalCluster
 
+    has_tls = importlib.util.find_spec("cryptography") is not None
+    if not has_tls:
+        _LOG.warning(
+            "other users of this machine can run code on Dask's ports on 127.0.0.1; "
+            "pip install cryptography closes them"
+        )
     # Drake before 1.56 leaks memory. Dask's nanny replaces a worker at its limit; a worker that
     # only pauses or spills would not get its memory back.
     memory = {f"distributed.worker.memory.{level}": False for level in ("target", "spill", "pause")}
@@ -77,6 +86,7 @@ def local_cluster(workers: int) -> LocalCluster:
             threads_per_worker=1,
             dashboard_address="localhost:0",
             silence_logs=logging.CRITICAL,  # dead workers are replaced; no need to log them
+            security=has_tls or None,
         )
     cluster.adapt(minimum=workers, maximum=workers)  # even if they die at their start
     return cluster

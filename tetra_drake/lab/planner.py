@@ -7,6 +7,7 @@ predictive path integral control (Williams et al., 2017).
 
 from __future__ import annotations
 
+import logging
 import math
 import numbers
 import time
@@ -32,6 +33,7 @@ returns costs of the robots (robots,), or of each time (times, robots), whose me
 weights by the names of readings: the cost is the sum of the readings times their weights."""
 
 
+_LOG = logging.getLogger("tetra_drake")
 MOST_STEPS = 10_000
 """Largest number of control periods that a plan looks ahead."""
 
@@ -137,8 +139,7 @@ class Planner:
 
         # The model's time begins at each decision anew, so that it needs little memory.
         duration = step * (self._steps + self._ahead + 2)
-        exact = scenario.with_sections(sensing=None)
-        alone = exact.with_sections(events=[], disturbances=None, policy=None, evolve={})
+        alone = scenario.undisturbed().with_sections(policy=None, evolve={}, sensing=None)
         model = alone.with_numbers({"simulation.duration": duration})
         robot = Robot.of(model)
         if not robot.driven.size:
@@ -178,6 +179,9 @@ class Planner:
         self._begins, self._next, self._latest = 0.0, -math.inf, -math.inf
         self.wall_times: list[float] = []
         self.costs: list[float] = []
+        self.lost = 0
+        """Number of decisions that kept the plan before, since all samples failed: readings with
+        NaN, such as of a lost marker, or a robot that nothing saves."""
 
     @property
     def decisions(self) -> int:
@@ -196,7 +200,8 @@ class Planner:
 
     def __str__(self) -> str:
         speed, kept = self.decisions_per_second, self.deadlines_kept
-        return f"{self.decisions} decisions, {speed:.3g} per second, {kept:.1%} in time"
+        lost = f", {self.lost} without a result" * (self.lost > 0)
+        return f"{self.decisions} decisions, {speed:.3g} per second, {kept:.1%} in time{lost}"
 
     def __call__(self, now: float, readings: Readings) -> np.ndarray:
         """The actions (actions,) at a time (s), for simulate(controller=...).
@@ -204,6 +209,10 @@ class Planner:
         `readings` are of one robot, without an axis of robots. A time before the latest one
         begins anew; see reset().
         """
+        check_type("Planner", "now", now, numbers.Real)
+        check_type("Planner", "readings", readings, Readings)
+        if not math.isfinite(now):
+            raise InputError("Planner", "now", f"found {now}, expected a time in s")
         if now < self._latest:
             self.reset()
         self._latest = now
@@ -254,6 +263,10 @@ class Planner:
         costs = self._costs(moments, now - self._period)
         known = np.isfinite(costs)
         if not known.any():  # all have failed
+            if not self.lost:
+                _LOG.warning("planner: all samples fail at %g s; it keeps its plan", now)
+            self.lost += 1
+            self.costs.append(math.nan)
             return plan
         self.costs.append(float(costs[known].mean()))
         scale = self._temperature * float(costs[known].std()) or 1.0

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.kernels.compiling import inlined
+from tetra_drake.kernels.compiling import CALLED, inlined
 from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, select
 
 PASSIVE = -1
@@ -223,7 +223,15 @@ dT/d(dl/dt) (N s/m), and the rate dl/dt (m/s)."""
 def elastic_tension(stretch: Real, law: CableLaw) -> Real:
     """Tension (N) of a cable's spring at rest. `stretch` (m) is the cable's length minus its free
     length. The tension is negative if the stretch is; slack_tension() takes it as 0 then."""
-    tension, curve = law.stiffness * stretch, law.curve
+    tension = law.stiffness * stretch
+    if law.curve.pieces:
+        tension = tension_on_curve(stretch, tension, law.curve)
+    return tension
+
+
+@functools.partial(inlined, options=CALLED)
+def tension_on_curve(stretch: Real, tension: Real, curve: Curve) -> Real:
+    """Tension (N) of a cable's curve at a stretch (m); `tension` (N) before its first piece."""
     for piece in range(curve.pieces):
         start, constant, linear, square, cube = piece_of(curve, piece)
         x = stretch - start

@@ -16,13 +16,9 @@ from pydantic import Field, PlainValidator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
-from tetra_drake.laws.terrain import Grid, Relief
+from tetra_drake.laws.terrain import Grid, Relief, fault_of_heights
 from tetra_drake.settings.quantities import Length
 from tetra_drake.settings.refusals import described, refuse
-
-MOST_HEIGHTS = 4_000_000
-HIGHEST = 1e6
-"""Largest height (m). Larger numbers would leave too few digits for the robot's motion."""
 
 RECORDED = re.compile(r"heights-[0-9a-f]{16}\.npy")
 """Pattern of the names of files that save() writes."""
@@ -53,13 +49,8 @@ class HeightFile(str):
         if not isinstance(path, str):
             refuse("", f"found {described(path)}, expected the path of a height file")
         heights = _read_heights(path)
-        if heights.ndim != 2 or min(heights.shape) < 3 or heights.size > MOST_HEIGHTS:
-            shape = " x ".join(map(str, heights.shape)) or "a single number"
-            expected = f"at least 3 x 3 heights, at most {MOST_HEIGHTS}"
-            refuse("", f"'{path}' holds {shape}, expected {expected}")
-        for row, column in np.argwhere(~(np.abs(heights) <= HIGHEST))[:1]:
-            found = f"{heights[row, column]} in row {row + 1}, column {column + 1}"
-            refuse("", f"'{path}' has {found}, expected heights of at most {HIGHEST:g} m")
+        if fault := fault_of_heights(heights):
+            refuse("", f"'{path}' has {fault}")
         digest = hashlib.sha256(f"{heights.shape}".encode() + heights.astype("<f8").tobytes())
         file = cls(f"heights-{digest.hexdigest()[:16]}.npy")
         if RECORDED.fullmatch(os.path.basename(path)) and os.path.basename(path) != file:

@@ -75,8 +75,6 @@ class Tally(NamedTuple):
     normal force."""
     least_tension: Annotated[Table, 1, math.inf]
     """Least tension of all cables at any time, in N."""
-    most_tension: Annotated[Table, "cables"]
-    """Greatest tension of each cable at any time, in N."""
     pitch_rate: Annotated[Table, 1]
     """Angular velocity (rad/s) of the structure about the y axis at the latest step; see
     kinematics.pitch_rate()."""
@@ -149,7 +147,6 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
     for i in range(cable_forces.shape[0]):
         tension = cable_forces[i, cable.TENSION]
         tally.least_tension[0] = minimum(tally.least_tension[0], tension)
-        tally.most_tension[i] = maximum(tally.most_tension[i], tension)
 
     rate = pitch_rate(forces.nodes, robot.first_node[robot.first_node.size - 1])
     turned = 0.5 * duration * (tally.pitch_rate[0] + rate)

@@ -335,6 +335,8 @@ BEHIND, AHEAD, ASIDE = 24.0 * INCH, 120.0 * INCH, 30.0 * INCH
 """Least reach of generated grids from the origin: backward, forward, sideways; in m."""
 FAR = 1000.0
 """Reach of an incline, on which a robot may roll, in every direction; in m."""
+HIGHEST = 1e6
+"""Largest height (m). Larger numbers would leave too few digits for the robot's motion."""
 MOST_CELLS = 4_000_000
 STEEPEST = math.radians(60.0)
 
@@ -349,6 +351,17 @@ class Grid:
     """Coordinates x and y of heights[0, 0], in m."""
     cell: tuple[float, float]
     """Distances between heights along x and y, in m."""
+
+
+def fault_of_heights(heights: np.ndarray) -> str:
+    """What is wrong with heights (rows, columns) in m, and what was expected; "" if nothing is."""
+    if heights.ndim != 2 or min(heights.shape) < 3 or heights.size > MOST_CELLS:
+        shape = " x ".join(map(str, heights.shape)) or "a single number"
+        return f"{shape} heights, expected at least 3 x 3, at most {MOST_CELLS} in all"
+    for row, column in np.argwhere(~(np.abs(heights) <= HIGHEST))[:1]:
+        found = f"{heights[row, column]} in row {row + 1}, column {column + 1}"
+        return f"{found}, expected heights of at most {HIGHEST:g} m"
+    return ""
 
 
 class Relief(Section):

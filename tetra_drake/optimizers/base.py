@@ -29,6 +29,8 @@ class Evaluation:
     engine: str = ""
     draws: Mapping[str, Sequence[float]] | None = None
     """Fitness and distance (m) of each draw of disturbances; None without disturbances."""
+    task: str = field(default="", compare=False)
+    """Trial and number of its task, such as "trial 0, evaluation 3"; "" if it does not name it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import logging
 import math
 import os
 from pathlib import Path
@@ -19,6 +20,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from tetra_drake import __version__
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
@@ -51,6 +53,9 @@ if TYPE_CHECKING:
 
 TRAJECTORY, REPLAY, RESULT = "trajectory.nc", "replay.html", "result.json"
 SCHEMA = 1
+
+
+_LOG = logging.getLogger("tetra_drake")
 
 
 class PathColumns(Section):
@@ -171,7 +176,12 @@ def load_result(folder: str | Path) -> SimulationResult:
     file = ResultFile.from_tree(content, path)
     check_plugins(file.versions, folder)
     scenario = load_scenario(folder / SCENARIO)
-    metrics = dict.fromkeys([*METRICS, "lifted_shares"], "") | file.metrics
+    unknown = [name for name in METRICS if name not in file.metrics]
+    if unknown and file.versions.get("tetra_drake") == __version__:
+        raise InputError(path, f"metrics.{unknown[0]}", "is missing")
+    if unknown:
+        _LOG.warning("%s: made without the metrics %s, which are NaN", path, ", ".join(unknown))
+    metrics: dict[str, Any] = dict.fromkeys(METRICS) | {"lifted_shares": ""} | file.metrics
     if wrong := wrong_metric(metrics):
         raise InputError(path, f"metrics.{wrong}", "is missing, or of a wrong type")
     numbers = {name: math.nan if metrics[name] is None else metrics[name] for name in METRICS}

@@ -22,7 +22,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, BEST_SCENARIO, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST, read_manifest
-from tetra_drake.evolution.run import Run, distinct_gaits, gait_label, load_run
+from tetra_drake.evolution.run import Run, distinct_gaits, gait_label, load_run, tell_code
 from tetra_drake.figures.fitness import (
     fitness_of_trials,
     initial_distances,
@@ -142,7 +142,9 @@ def write_figures(source: Path, out: Path | None = None, printed: Print = AS_USU
     if not is_run:
         draw_pictures(pictures_of_gait(load_result(source)), folder, printed)
         return [folder]
-    with read_manifest(source).in_its_units():
+    manifest = read_manifest(source)
+    tell_code(manifest.scenario, source)
+    with manifest.in_its_units():
         if out is None:
             return write_report(source, printed)
         pictures = pictures_of_run(simulate_shown_gaits(load_run(source)))

@@ -110,7 +110,8 @@ def result_text(result: SimulationResult) -> str:
     robot = result.robot
     still = stillness_remark(robot, vars(metrics)) if result.gait else ""
     remarks = [start_up_remark(robot) or still, sinking_remark(robot), yielding_remark(robot)]
-    remarks += [overload_remark(robot, result.tally.most_tension)] if result.tally else []
+    if result.recorded is not None:
+        remarks.append(overload_remark(robot, result.trajectory.tension.max("time").values))
     lines += [sentence(remark) for remark in remarks if remark]
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]

@@ -206,7 +206,9 @@ def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
         for row, pilot in enumerate(some):
             if pilot.seen:
                 shown.put(row, pilot.seen(shown.rows(row).copied()))
-        signals[rows] = some[0].law(together, shown, values)
+        given, shape = some[0].law(together, shown, values), signals[rows].shape
+        source = some[0].source
+        signals[rows] = checked_numbers(given, shape, source=source, key="signals", finite=True)
     return signals
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tetra_drake.errors import InputError
@@ -9,9 +11,10 @@ from tetra_drake.laws import terrain
 from tetra_drake.laws.contact import Ground, GroundSection, NormalForce
 from tetra_drake.laws.friction import FrictionKind
 from tetra_drake.laws.kinematics import NODE_COLUMNS, P_WN
-from tetra_drake.laws.terrain import Grid, Relief
+from tetra_drake.laws.terrain import Grid, Relief, fault_of_heights
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.world import World
+from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.units import INCH
 
 STEP_AHEAD = 1.0 * INCH
@@ -94,6 +97,12 @@ def make_surface(
     `grid` has the terrain's heights. By default it is made from `terrain_kind`, whose steps or
     obstacles begin at x = 0 if its settings give no start."""
     grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
+    heights = np.ascontiguousarray(grid.heights, dtype=float)
+    fault = fault_of_heights(heights)
+    if not (np.isfinite(grid.corner).all() and 0.0 < min(grid.cell) <= max(grid.cell) < math.inf):
+        fault = f"the corner {grid.corner} and cells of {grid.cell} m"
+    if fault:
+        raise InputError(origin(terrain_kind), "grid", f"has {fault}")
     is_stepped = terrain_kind.is_stepped
     surface_grid = terrain.SurfaceGrid.of(grid.heights, grid.corner, grid.cell, is_stepped)
     return Ground.nowhere()._replace(
@@ -101,7 +110,7 @@ def make_surface(
         friction=friction.law(),
         flat=terrain_kind.is_flat,
         grid=np.array(surface_grid),
-        heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
+        heights=heights.ravel(),
     )
 
 

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.errors import InputError, check_whole
+from tetra_drake.errors import InputError, check_type, check_whole
 from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.robot.gait import Body, Gait, check_parameters
 from tetra_drake.scenario.joined_keys import separate
@@ -102,6 +102,7 @@ class ParameterSpace:
         """Gait called `name` with the parameters of a vector (parameters,), in the order of
         `names`; the bounds are not checked. Raises InputError for a vector of another size, or for
         a number that no gait may have, such as a weight below 0."""
+        check_type("ParameterSpace", "name", name, str)
         values = dict(zip(self.names, self._numbers(vector).tolist(), strict=True))
         own = {key: values[one.copies or key] for key, one in self.parameters.items()}
         check_parameters(own, self.parameters, f"gait {name}")
@@ -120,6 +121,7 @@ class ParameterSpace:
         """Parameter vector of a gait, without its name, its turn and fixed numbers of its body. Of
         parameters that copy each other, the first one counts. Raises InputError if the gait has
         other parameters, or lacks a number of the body."""
+        check_type("ParameterSpace", "gait", gait, Gait)
         key = f"gait {gait.name}"
         values = check_parameters(gait.parameters, self.parameters, "ParameterSpace", key)
         values |= self._body_numbers(gait)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import NoneType
 from typing import Self
 
 import numpy as np
 from scipy import linalg
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import cable
 from tetra_drake.laws.actuator import DrivenCables
@@ -277,6 +278,7 @@ class Robot:
         InputError if a value is not between -1 and 1, or if no oscillator is on one side of the
         robot.
         """
+        check_type("steering", "", steering, Callable, NoneType)
         if (steering or gait.turn) and not self.structure.sides.any():
             source = "steering" if steering else f"gait {gait.name}"
             raise InputError(source, "", "turns, but no oscillator is on one side of the robot")

@@ -24,6 +24,7 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.scenario.policies import DrivenRobots
+from tetra_drake.settings.plugins import origin
 
 MARK_DECIMALS = 9
 """Decimals of the times (s) at which a step must end. A step between two times that differ in
@@ -56,6 +57,12 @@ class Pilot:
         """The policy's settings, or the controller, and the kind of actuators, as a text. Robots
         with equal ones can be steered together."""
         return repr((getattr(self.law, "__self__", self.law), self.robots.actuation))
+
+    @functools.cached_property
+    def source(self) -> str:
+        """What gives the signals, for messages: the policy and its plug-in, or "controller"."""
+        policy = getattr(self.law, "__self__", None)
+        return "controller" if policy is None else origin(policy)
 
     def acts_after(self, time: float) -> float:
         """Time (s) of the next action after an action at `time` (s); infinite for the last one."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
 import numpy as np
 
@@ -15,6 +16,11 @@ def add_element(parent: Element, tag: str, text: Any = None, **attributes: Any) 
     element = SubElement(parent, tag, written)
     element.text = None if text is None else _written(text)
     return element
+
+
+def add_comment(parent: Element, text: str) -> None:
+    """Adds a comment to `parent`. XML has no hyphens in a row there."""
+    parent.append(Comment(f" {re.sub('-(?=-)', '- ', text)} "))
 
 
 def xml_text(root: Element) -> str:

@@ -40,8 +40,9 @@ class Drake(EngineSettings):
     n² per second."""
     accuracy: float | None = Field(default=None, gt=0)
     """Target accuracy per step. By default half the least damping ratio of a cable, anchor or joint
-    with the robot's mass, from 2e-5 to 0.005, or to 0.01 where friction is nearly viscous, as in
-    the scenario thesis: longer steps of radau3 would damp vibrations."""
+    with the robot's mass, because longer steps of radau3 would damp vibrations: from 2e-5 to 0.005,
+    or to 0.01 where friction is nearly viscous, as in the scenario thesis; to a tenth of this for
+    robots with joints."""
     max_step: Time | None = Field(default=None, gt=0)
     """Longest step. By default 8 ms, or 12 ms where friction is nearly viscous; less if that
     damping ratio is below 0.05."""

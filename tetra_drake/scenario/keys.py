@@ -77,7 +77,7 @@ def keys_page() -> str:
         for section in sections:
             title = section.get("title", "")
             parts.append(f"## `{inner}`" + (f": `{title}`" if title else ""))
-            parts.append(" ".join(section["description"].split()))
+            parts.append(" ".join(section.get("description", "").split()))
             rows = [row for row in keys_in(section, schema, inner) if "description" in row[1]]
             parts.append(_list_of_keys(rows, told, title))
         others += [] if sections else [(key, node)]

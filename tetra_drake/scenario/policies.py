@@ -7,14 +7,17 @@ on; its signals are held in between. To add a kind, write a section with paramet
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from tetra_drake.errors import InputError
 from tetra_drake.laws.actuator import ActuatorKind, DrivenCables
 from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.scenario.blueprint import Blueprint
+from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.section import Kinds, Section
 
 PolicyBounds = tuple[float, float]
@@ -58,6 +61,11 @@ class DrivenRobots(NamedTuple):
 class PolicyKind(Section):
     """Base class for the settings of a policy."""
 
+    @property
+    def code(self) -> str:
+        """Function outside the package that the policy runs; "" for none."""
+        return ""
+
     def parameters(self, blueprint: Blueprint) -> Mapping[str, PolicyBounds]:
         """Names of the policy's parameters for a robot, with their bounds in random policies. A
         search may leave the bounds."""
@@ -65,7 +73,12 @@ class PolicyKind(Section):
 
     def gait_parameters(self, blueprint: Blueprint) -> Mapping[str, GaitParameter]:
         """The same as parameters of a gait."""
-        return {key: GaitParameter(*pair) for key, pair in self.parameters(blueprint).items()}
+        found = {key: GaitParameter(*pair) for key, pair in self.parameters(blueprint).items()}
+        for key, one in found.items():
+            if not -math.inf < one.low <= one.high < math.inf:
+                expected = "expected finite bounds, the least first"
+                raise InputError(origin(self), key, f"found {one.low} to {one.high}, {expected}")
+        return found
 
     def signals(self, robots: DrivenRobots, readings: Any, values: np.ndarray) -> np.ndarray:
         """Signals (N, driven) in N of robots, from their robot.readings.Readings, and the

@@ -39,6 +39,7 @@ from tetra_drake.scenario.structure_graph import (
     with_joints,
 )
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
+from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.quantities import (
     Acceleration,
     Damping,
@@ -82,7 +83,7 @@ def _check_name(name: object) -> object:
     refused: they separate the parts of cable names, the parts of keys, and keys."""
     if not isinstance(name, str):
         refuse("", f"found the name {name}, expected a text, such as n{name}")
-    if re.search(r"[\s.,\[\]]", name):
+    if re.search(r"[\s.,\[\]]", name) or not name.isprintable():
         refuse("", f"found the name '{name}', expected one without blanks, dots, commas, brackets")
     return name
 
@@ -162,14 +163,14 @@ class CurveTable(Section):
 class CableGroup(Section):
     """Cables, springs or strings with the same constants. They never push."""
 
+    damping: Damping | None = Field(default=None, ge=0)
+    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
+    default is 1 ms times its stiffness."""
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
     """The nodes that each cable joins. A cable such as [a, b, c] runs over frictionless rings at
     its inner nodes, with one tension."""
     stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
     """Tension per elongation. Only a string or a curve needs none."""
-    damping: Damping | None = Field(default=None, ge=0)
-    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
-    default is 1 ms times its stiffness."""
     string: bool = Field(default=False, exclude_if=operator.not_)
     """True for strings, which hardly stretch. Without a stiffness they get the default of
     `anchor_stiffness`."""
@@ -206,14 +207,13 @@ class CableGroup(Section):
             refuse("free_length", f"found {found}, expected one of free_length and tension")
         if self.curve and (self.stiffness or self.quadratic or self.cubic or self.string):
             refuse("curve", "found another law beside it, expected the curve alone")
-        if self.stiffness is None and not (self.curve or self.string):
-            refuse("stiffness", "is missing; give it")
         if self.string and (self.initial_tension or self.quadratic or self.cubic):
             refuse("string", "found a law of a spring beside it, expected stiffness at most")
-        if self.string and self.stiffness is None and self.free_length is None:
-            refuse("free_length", "is missing; give it for a string without stiffness")
-        if self.damping is None and not self.string:
-            refuse("damping", "is missing; give it")
+        needed = {"stiffness": not (self.curve or self.string), "damping": not self.string}
+        needed |= {"free_length": self.string and self.stiffness is None}
+        for key, is_needed in needed.items():
+            if is_needed and getattr(self, key) is None:
+                refuse(key, "is missing; give it")
         for name, factors in self.factors.items():
             if len(factors) != len(self.pairs) or getattr(self, name) is None:
                 found = f"found {len(factors)} factors of {name}"
@@ -711,7 +711,10 @@ class ParametricRobot(RobotSettings):
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the structure."""
-        made = self.structure().blueprint()
+        structure = self.structure()
+        if not isinstance(structure, StructureFile):
+            refuse("", f"{origin(self)}: structure() gave {structure!r:.40}, expected a Structure")
+        made = structure.blueprint()
         moved = np.array(self.offsets or made.offsets)
         return dataclasses.replace(made, offsets=moved, start=self.start or made.start)
 

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Mapping
 from importlib import metadata
 from typing import Any
 
+from tetra_drake import on_demand
 from tetra_drake.errors import InputError
 
 KINDS, OPTIMIZERS, STRUCTURES = map("tetra_drake.{}".format, ("kinds", "optimizers", "structures"))
@@ -53,6 +54,22 @@ def loaded(entry: Any) -> Any:
     except (Exception, SystemExit) as error:
         cause = f"{type(error).__name__}: {error}"
         raise refusal(entry, f"cannot import {entry.value}: {cause}") from error
+
+
+def origin(kind: Any) -> str:
+    """Tag of a kind, with the plug-in that it is from."""
+    added = (*entries(KINDS).values(), *entries(OPTIMIZERS).values())
+    titles = [_title(entry) for entry in added if loaded(entry) is type(kind)]
+    return ": ".join([*titles, f"!{kind.tag}"])
+
+
+def part_of(kind: Any, name: str) -> Any:
+    """Object in the module of an engine or an optimiser. Raises InputError that names the plug-in,
+    if its module has none."""
+    try:
+        return on_demand.loaded(f"{kind.module}:{name}")
+    except (AttributeError, ModuleNotFoundError) as error:
+        raise InputError(origin(kind), "module", f"has no {name}: {error}") from error
 
 
 def refusal(entry: Any, problem: str) -> InputError:

@@ -121,7 +121,7 @@ class Section(BaseModel):
     """Tag in files, without "!"; by default the name of the class."""
 
     def __init__(self, **values: Any) -> None:
-        values = tree_value(values)
+        values = tree_value(values, type(self).__name__)
         try:
             super().__init__(**values)
         except ValidationError as error:
@@ -171,7 +171,7 @@ class Section(BaseModel):
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
         """Makes the section from the parsed content of a file. `key` is the dotted key of the
         section there. Raises InputError that names `source` and key."""
-        tree = tree_value(tree)
+        tree = tree_value(tree, source)
         try:
             return cls.model_validate(tree, context=IN_FILE)
         except ValidationError as error:
@@ -241,6 +241,10 @@ class Kinds:
             if base in kind.__mro__ and (kind.tag in tags or kind.tag != name):
                 raise refusal(entry, f"found !{kind.tag}, expected !{name}, which no kind here has")
             if base in kind.__mro__:
+                try:
+                    kind.model_rebuild()
+                except (NameError, pydantic.PydanticUserError) as error:
+                    raise refusal(entry, f"cannot be built: {error}") from error
                 yield kind
 
 
@@ -287,9 +291,10 @@ def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
     return change(value)
 
 
-def tree_value(value: Any) -> Any:
+def tree_value(value: Any, source: object = "") -> Any:
     """Converts a value from Python, such as a section, a tuple, an array or a path, to the lists,
-    mappings, numbers and texts that YAML has."""
+    mappings, numbers and texts that YAML has. Raises InputError, naming `source`, for a text with
+    control characters: it would reach a terminal, or an XML file, which cannot have them."""
 
     def convert(part: Any) -> Any:
         if isinstance(part, Section):
@@ -298,7 +303,15 @@ def tree_value(value: Any) -> Any:
             return os.fspath(part)
         return part.tolist() if hasattr(part, "tolist") else part
 
-    return mapped(value, convert)
+    tree = mapped(value, convert)
+    for part in parts_in(tree):
+        for text in part if isinstance(part, dict) else [part]:
+            if isinstance(text, str) and _UNSEEN.search(text):
+                raise InputError(source, "", f"found a control character in '{text}'")
+    return tree
+
+
+_UNSEEN = re.compile(r"[^\t\n\r -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def parts_of(key: str) -> list[str | int]:

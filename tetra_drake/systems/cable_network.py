@@ -177,13 +177,12 @@ class CableNetwork(ConvertibleSystem):
 
     def _warn(self, table: np.ndarray) -> None:
         """Warns, once, of a signal that pulls a slack cable."""
-        slack = self._law.free_length - table[:, cable.LENGTH]
-        pulled = np.where(slack > 0.0, table[:, cable.TENSION], 0.0)
+        is_slack = table[:, cable.LENGTH] < self._law.free_length
+        pulled = np.where(is_slack, table[:, cable.TENSION], 0.0)
         if pulled.any():
             most, self.warns = int(pulled.argmax()), False
-            force = f"{pulled[most]:.3g} N, which wind no cable; see actuation of AddCables"
-            told = f"'{self._names[most]}' is slack by {1e3 * slack[most]:.3g} mm, but pulled with"
-            warnings.warn(f"{told} {force}", RuntimeWarning, stacklevel=2)
+            told = f"'{self._names[most]}' is slack, and its signal pulls with {pulled[most]:.3g} N"
+            warnings.warn(f"{told}; see actuation of AddCables", RuntimeWarning, stacklevel=2)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._table(context, output.get_mutable_value())

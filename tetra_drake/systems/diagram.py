@@ -119,8 +119,9 @@ def MakeTensegrityDiagram(
     discrete state, as Drake's Linearize and DirectCollocation need it. So it is right near a state
     only: a node that sticks there keeps its friction where it lifts off.
 
-    Raises InputError if a gait is not of this robot, a port of the controller or of the ground is
-    missing or has another size, or `ground` is given with `modes`.
+    Raises InputError if the scenario has events, or a policy beside a gait; if a gait is not of
+    this robot, a port of the controller or of the ground is missing or has another size, or
+    `ground` is given with `modes`.
     """
     source = "MakeTensegrityDiagram"
     check_type(source, "robot", robot, Robot)
@@ -130,6 +131,11 @@ def MakeTensegrityDiagram(
     check_type(source, "scene_graph", scene_graph, bool)
     check_type(source, "meshcat", meshcat, Meshcat, NoneType)
     scenario, structure = robot.scenario, robot.structure
+    if scenario.events:
+        raise InputError(scenario.name, "events", "found some; only td.simulate() knows them")
+    if scenario.policy is not None and gait is not None:
+        problem = "found one beside a gait; give a SampledController of it in place of the gait"
+        raise InputError(scenario.name, "policy", problem)
     builder = DiagramBuilder()
 
     plant, scene = _AddPlant(builder, scene_graph=scene_graph or meshcat is not None)

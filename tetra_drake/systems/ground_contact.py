@@ -143,6 +143,7 @@ class GroundContact(ConvertibleSystem):
         """
         check_parameters("SetGround", self, context)
         check_type("SetGround", "ground", ground, contact.Ground)
+        check_type("SetGround", "ground.friction", ground.friction, type(self._ground.friction))
         if ground.friction.kind != self._ground.friction.kind:
             raise InputError("SetGround", "ground", "found another law of friction")
         # The last number of a grid is the largest radius of a foot, and rolled surfaces come last.

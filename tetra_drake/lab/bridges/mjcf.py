@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, escaped
 from tetra_drake.lab.bridges.mjcf_file import compiled_model
 from tetra_drake.lab.bridges.mjcf_forces import (
     actuator_laws,
@@ -203,7 +203,7 @@ class _MjcfTranslation:
 
     def _name(self, kind: str, number: int) -> str:
         """Name of an element, such as a site; its kind and number if it has none."""
-        return getattr(self.model, kind)(number).name or f"{kind}{number}"
+        return escaped(getattr(self.model, kind)(number).name) or f"{kind}{number}"
 
     def _note(self, what: str, kind: str, number: int) -> None:
         self.notes.setdefault(what, []).append(self._name(kind, number))

@@ -9,12 +9,14 @@ frames.
 
 from __future__ import annotations
 
+import re
 from xml.etree.ElementTree import Element
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from tetra_drake.errors import InputError
 from tetra_drake.laws.model import WORLD
 from tetra_drake.robot.structure import NODE_COLOUR, Shape, Structure, shapes_of
 from tetra_drake.robot.xml_elements import add_element, xml_text
@@ -25,7 +27,8 @@ FIXED = "fixed nodes"
 
 def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
     """SDFormat text of a model called `name`: the bodies of a structure at the poses of a `state`
-    [q; v] (13*bodies,), with a frame for each node. Cables and joints are left out."""
+    [q; v] (13*bodies,), with a frame for each node. Cables and joints are left out. Raises
+    InputError for a name that SDFormat refuses."""
     root = Element("sdf", version="1.9")
     model = add_element(root, "model", name=name)
     shapes = [*shapes_of(structure)]
@@ -60,6 +63,11 @@ def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
         link_name, frame = links[structure.carriers[node]], f"node {structure.node_names[node]}"
         element = add_element(model, "frame", name=frame, attached_to=link_name)
         _add_pose(element, RigidTransform(p_BN))
+    taken = [part.get("name") for part in model]
+    for given in (each.get("name", "") for each in root.iter()):
+        if re.search(r"::|^__.*__$|^world$|^\s|\s$", given) or taken.count(given) > 1:
+            problem = f"found the name '{given}', which SDFormat reserves, or takes once only"
+            raise InputError(name, "robot", problem)
     return xml_text(root)
 
 

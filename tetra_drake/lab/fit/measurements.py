@@ -49,11 +49,6 @@ from tetra_drake.settings.units import given_quantity
 
 SAMPLE_PERIOD = 5e-3
 """Time (s) between samples of simulated motion. Cubic curves join the samples."""
-OFFSETS, APART = 41, 0.02
-"""Least number of offsets of a clock, and greatest difference (s) between them, that are tried
-before the best one is refined."""
-CLOCK_DIGITS = 1e-7
-"""Tolerance (s) of the offset of a clock."""
 ROUNDING = 1e-6
 """Time (s) by which times in a log may be rounded."""
 DELAY = 0.1
@@ -218,63 +213,59 @@ class MotionCapture(_Placed):
         return [self._prediction(outcome, log) for outcome in outcomes]
 
     def _prediction(self, outcome: Outcome, log: pandas.DataFrame) -> Prediction:
-        from scipy.interpolate import CubicHermiteSpline
-        from scipy.optimize import minimize_scalar
+        from scipy.interpolate import CubicHermiteSpline, make_interp_spline
         from scipy.spatial.transform import Rotation
 
-        from tetra_drake.lab.fit.placement import Frame, aligned, aligned_with_offsets
+        from tetra_drake.lab.fit.placement import nearest
 
-        measured, first = _by_node(log), log.index[0]
-        times, is_there = log.index.to_numpy() - first, np.isfinite(measured)
-        whole, offsets = is_there.all(axis=2), np.zeros((0, 3))
+        seen, first, last = _by_node(log), float(log.index[0]), float(log.index[-1])
         if isinstance(outcome, SimulationFailure):
-            count = is_there.sum() + measured[0].size * bool(self.marker_offset)
+            count = np.isfinite(seen).sum() + seen[0].size * bool(self.marker_offset)
             return Prediction(np.full(count, np.nan))
         moved, structure, names = outcome.trajectory, outcome.robot.structure, log.columns[::3]
         nodes = [structure.node_names.index(name[:-2]) for name in names]
         p, v = (each.values[:, nodes] for each in (moved.p_WN, moved.v_WN))
-        curves, end = CubicHermiteSpline(moved.time.values, p, v), float(moved.time[-1])
-        is_free = self.origin is self.turn is None and whole.any(axis=0).sum() >= MARKERS
-        known = self.frame()
+        q_WB, end = moved.q_WB.values, float(moved.time[-1])
+        R_WB = Rotation.from_quat(np.roll(q_WB, -1, axis=2).reshape(-1, 4)).as_matrix()
+        fixed_too = np.pad(R_WB.reshape(*q_WB.shape[:2], 3, 3), ((0, 0), (0, 1), (0, 0), (0, 0)))
+        fixed_too[:, WORLD] = np.eye(3)
+        positions = CubicHermiteSpline(moved.time.values, p, v)
+        axes = make_interp_spline(moved.time.values, fixed_too[:, structure.carriers[nodes]], k=1)
 
-        def placed(shift: float) -> tuple[np.ndarray, Frame]:
+        def times(shift: float) -> np.ndarray:
             # The robot stands still before and after the simulation.
-            p = curves(np.clip(times - shift, 0.0, end))
-            return p, aligned(p[whole], measured[whole]) if is_free else known
+            return np.clip(log.index.to_numpy() - first - shift, 0.0, end)
 
-        def misfit(shift: float) -> float:
-            p, (turn, origin) = placed(shift)
-            return float(((p @ turn.T + origin - measured)[is_there] ** 2).sum())
-
-        shift, slack = -first, self.clock or 0.0
-        low, high = shift - slack, shift + slack
-        if self.clock is None and not -ROUNDING <= first <= log.index[-1] <= end + ROUNDING:
-            low, high = times[-1] - end - DELAY, DELAY
-        if low < high:
-            tried = np.linspace(low, high, max(OFFSETS, math.ceil((high - low) / APART)))
-            nearest, step = tried[np.argmin([misfit(each) for each in tried])], tried[1] - tried[0]
-            bounds = max(nearest - step, low), min(nearest + step, high)
-            shift = minimize_scalar(misfit, bounds=bounds, options={"xatol": CLOCK_DIGITS}).x
-        (p, frame), notes = placed(shift), list[str]()
+        slack = self.clock or 0.0
+        clock = -first - slack, slack - first
+        if self.clock is None and not -ROUNDING <= first <= last <= end + ROUNDING:
+            clock = last - first - end - DELAY, DELAY
+        markers = np.isfinite(seen).all(axis=2).any(axis=0).sum()
+        is_free = self.origin is self.turn is None and markers >= MARKERS
+        frame = None if is_free else self.frame()
+        share = self.uncertainty / self.marker_offset if self.marker_offset else 0.0
+        found = nearest(
+            lambda shift: positions(times(shift)),
+            lambda shift: axes(times(shift)),
+            seen,
+            clock=clock,
+            frame=frame,
+            share=share,
+        )
+        notes = list[str]()
         if self.marker_offset:
-            q_WB = moved.q_WB.values[np.searchsorted(curves.x[:-1], times - shift)]
-            R_WB = Rotation.from_quat(np.roll(q_WB, -1, axis=2).reshape(-1, 4)).as_matrix()
-            R = R_WB.reshape(*q_WB.shape[:2], 3, 3)[:, structure.carriers[nodes]]
-            R[:, structure.carriers[nodes] == WORLD] = np.eye(3)
-            share = self.uncertainty / self.marker_offset
-            frame, offsets = aligned_with_offsets(p, R, measured, frame, share, is_free=is_free)
-            p = p + np.einsum("tnij,nj->tni", R, offsets)
-            beside = 1e3 * np.linalg.norm(offsets, axis=1)
+            beside = 1e3 * np.linalg.norm(found.offsets, axis=1)
             where = names[beside.argmax()][:-2]
             notes.append(f"markers are beside nodes, at most by {beside.max():.1f} mm at {where}")
-        turn, origin = frame
         if is_free:
+            turn, origin = found.frame
             place = ", ".join(f"{fixed(1e3 * each, 1)} mm" for each in origin)
             angles = Rotation.from_matrix(turn).as_euler("XYZ", degrees=True)
             angle = ", ".join(f"{fixed(each)} deg" for each in angles)
             notes.append(f"the frame has origin: [{place}], turn: [{angle}]")
-        values = np.append((p @ turn.T + origin)[is_there], offsets)
-        return Prediction(values, float(shift + first), notes)
+        offsets = found.offsets if self.marker_offset else np.zeros((0, 3))
+        values = np.append(found.p[np.isfinite(seen)], offsets)
+        return Prediction(values, found.shift + float(first), notes)
 
 
 class Rest(_Placed):

@@ -1,15 +1,39 @@
-"""Placement of measurements: the frame of a log, and offsets of markers.
+"""Placement of measurements: the clock and the frame of a log, and offsets of markers.
 
 A frame is the pose of the model's world in the log: its rotation (3, 3), and its origin (3,) in m.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+OFFSETS, APART = 41, 0.02
+"""Least number of offsets of a clock, and greatest difference (s) between them, that are tried
+before the best one is refined."""
+EXACT = 1e-10
+"""Relative tolerance of the refinement, in the sum of squares and in the unknowns."""
+
 Frame = tuple[np.ndarray, np.ndarray]
+OverTime = Callable[[float], np.ndarray]
+"""Something that moves, at the times of a log for an offset (s) of its clock."""
+
+
+class Placement(NamedTuple):
+    """Clock and frame of a log, and markers in it."""
+
+    shift: float
+    """Offset (s) of the clock."""
+    frame: Frame
+    offsets: np.ndarray
+    """Offsets (nodes, 3) in m of markers from their nodes, in the axes of bodies."""
+    p: np.ndarray
+    """Positions (times, nodes, 3) in m of the markers in the log, as predicted."""
 
 
 def aligned(p: np.ndarray, seen: np.ndarray) -> Frame:
@@ -20,21 +44,62 @@ def aligned(p: np.ndarray, seen: np.ndarray) -> Frame:
     return turn, there - turn @ here
 
 
-def aligned_with_offsets(
-    p: np.ndarray, R: np.ndarray, seen: np.ndarray, frame: Frame, share: float, *, is_free: bool
-) -> tuple[Frame, np.ndarray]:
-    """The frame near `frame`, or just that unless `is_free`, and the offsets (nodes, 3) of markers
-    in the axes R (times, nodes, 3, 3) of bodies that bring nodes p (times, nodes, 3) nearest to the
-    `seen` markers. `share` is the standard deviation of a coordinate over the one of an offset."""
-    is_whole = np.isfinite(seen).all(axis=2, keepdims=True)
+def nearest(
+    places: OverTime,
+    axes: OverTime,
+    seen: np.ndarray,
+    *,
+    clock: tuple[float, float],
+    frame: Frame | None,
+    share: float,
+) -> Placement:
+    """The placement that brings a motion nearest to the `seen` markers (times, nodes, 3) in m.
 
-    def split(x: np.ndarray) -> tuple[Frame, np.ndarray, np.ndarray]:
-        turn = Rotation.from_rotvec(is_free * x[:3]).as_matrix() @ frame[0]
-        origin = frame[1] + is_free * x[3:]
-        beside = np.einsum("tnij,tni->tnj", R, (seen - origin) @ turn - p)
-        beside = np.where(is_whole, beside, 0.0)
-        offsets = beside.sum(axis=0) / (is_whole.sum(axis=0) + share**2)
-        rest = np.append(is_whole * (beside - offsets), share * offsets)
-        return (turn, origin), offsets, rest
+    Args:
+        places: positions of the nodes (times, nodes, 3) in m.
+        axes: rotation matrices of their bodies (times, nodes, 3, 3).
+        seen: positions of the markers, NaN in gaps.
+        clock: least and greatest offset of the clock in s.
+        frame: the frame; None to find it.
+        share: standard deviation of a coordinate over the one of a marker's offset along an axis;
+            0 for markers without offsets.
+    """
+    is_there = np.isfinite(seen)
+    is_whole = is_there.all(axis=2, keepdims=True)
+    whole, counts = is_whole[:, :, 0], is_whole.sum(axis=0)
 
-    return split(least_squares(lambda x: split(x)[2], np.zeros(6)).x)[:2]
+    def placed(shift: float, frame: Frame | None) -> Placement:
+        p = places(shift)
+        turn, origin = frame = frame or aligned(p[whole], seen[whole])
+        offsets = np.zeros(p.shape[1:])
+        if share:
+            R = axes(shift)
+            beside = np.einsum("tnij,tni->tnj", R, (seen - origin) @ turn - p)
+            offsets = np.where(is_whole, beside, 0.0).sum(axis=0) / (counts + share**2)
+            p = p + np.einsum("tnij,nj->tni", R, offsets)
+        return Placement(shift, frame, offsets, p @ turn.T + origin)
+
+    def residuals(found: Placement) -> np.ndarray:
+        return np.append((found.p - seen)[is_there], share * found.offsets)
+
+    (low, high), start = clock, placed(clock[0], frame)
+    if low < high:
+        tried, step = np.linspace(
+            low, high, max(OFFSETS, math.ceil((high - low) / APART)), retstep=True
+        )
+        misfits = [(residuals(placed(shift, frame)) ** 2).sum() for shift in tried]
+        start = placed(float(tried[np.argmin(misfits)]), frame)
+        low, high = max(start.shift - step, low), min(start.shift + step, high)
+    elif frame or not share:
+        return start
+
+    def moved(x: np.ndarray) -> Placement:
+        turn, origin = start.frame
+        if x.size > 1:
+            turn, origin = Rotation.from_rotvec(x[1:4]).as_matrix() @ turn, origin + x[4:]
+        own = (turn, origin) if x.size > 1 else frame
+        return placed(float(np.clip(start.shift + x[0], low, high)), own)
+
+    unknowns = 7 if share and not frame else 1
+    tolerances = {"ftol": EXACT, "xtol": EXACT, "x_scale": "jac"}
+    return moved(least_squares(lambda x: residuals(moved(x)), np.zeros(unknowns), **tolerances).x)

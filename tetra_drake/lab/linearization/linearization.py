@@ -28,8 +28,9 @@ from tetra_drake.settings.refusals import no_such
 
 STEP = 1e-6
 """Step of the central differences: in rad, as a share of the largest body's radius (m, and m/s), of
-the greatest force (N), and of the greatest state of an actuator. The matrices are exact to some
-1e-10 of their greatest numbers; the spin of a thin bar, whose inertia is small, to 1e-8."""
+the greatest force (N) as far as no signal makes a cable slack, and of the greatest state of an
+actuator. The matrices are exact to some 1e-10 of their greatest numbers; the spin of a thin bar,
+whose inertia is small, to 1e-8."""
 _ROUNDED, _UNRESISTED, _SOLVED = 1e-9, 1e-7, 1e-3
 """Greatest errors: of an eigenvalue, as a share of the greatest one; of numbers of the matrices, as
 a share of the greatest; of LQR's equation, as a share of its greatest term."""
@@ -160,6 +161,7 @@ class Linearization:
     def deviation(self, readings: Readings) -> np.ndarray:
         """States x (states,) of a robot with these readings: its deviations from `state`. Raises
         InputError if the actuators have states, which are not among the readings."""
+        check_type("deviation", "readings", readings, Readings)
         self._check_readable()
         structure, count = self.robot.structure, 7 * len(self.robot.structure.bodies)
         now = bodies_state(readings, structure)
@@ -221,11 +223,13 @@ def linearize(
         check_type("linearize", "outputs", output, str)
         if output not in names:
             raise InputError("linearize", "outputs", no_such("readings", output, [*names]))
-    left, greatest = _forces_left(robot, at, fixed)
+    left, greatest, least = _forces_left(robot, at, fixed)
     if state is None and left > BALANCED * greatest:
         problem = "does not rest on this terrain with these actuators; give a state"
         raise InputError(robot.scenario.name, "robot", problem)
-    A, *matrices = _matrices(robot, at, fixed, outputs, of_signals=greatest)
+    A, *matrices = _matrices(
+        robot, at, fixed, outputs, of_signals=min(greatest, 0.5 * least / STEP)
+    )
     if not all(np.isfinite(matrix).all() for matrix in (A, *matrices)):
         raise InputError("linearize", "state", "found a state whose forces are not finite")
     resisted = _resisted_states(robot, at, A)
@@ -321,10 +325,10 @@ def _resisted_states(robot: Robot, state: np.ndarray, A: np.ndarray) -> np.ndarr
     return np.asarray(linalg.null_space(free.T))
 
 
-def _forces_left(robot: Robot, state: np.ndarray, modes: np.ndarray) -> tuple[float, float]:
-    """The force (N) that accelerates a body most, and the greatest force: a tension or the robot's
-    weight, 1 if both are 0. Torques count with the radius of the body. Infinite if an actuator
-    moves."""
+def _forces_left(robot: Robot, state: np.ndarray, modes: np.ndarray) -> tuple[float, float, float]:
+    """The force (N) that accelerates a body most, infinite if an actuator moves; the greatest
+    force, a tension or the robot's weight, 1 if both are 0; and the least tension of a driven cable
+    that pulls. Torques count with the radius of the body."""
     bodies, drives = robot.model.bodies, robot.starting_drives()
     acceleration, rates, forces = rates_and_forces(
         robot.model, state, modes, robot.first_signals, drives
@@ -335,7 +339,9 @@ def _forces_left(robot: Robot, state: np.ndarray, modes: np.ndarray) -> tuple[fl
     if np.abs(rates).max(initial=0.0) > BALANCED * np.abs(drives).max(initial=1.0):
         left = math.inf
     tensions = forces.cable_forces[:, TENSION]
-    return float(left), max(float(tensions.max(initial=0.0)), robot.weight) or 1.0
+    greatest = max(float(tensions.max(initial=0.0)), robot.weight) or 1.0
+    pulls = tensions[robot.driven]
+    return float(left), greatest, pulls[pulls > _ROUNDED * greatest].min(initial=math.inf)
 
 
 def _state_names(robot: Robot) -> tuple[str, ...]:

@@ -201,6 +201,7 @@ def predict(
     check_whole("predict", "seed", seed, least=0)
     check_type("predict", "quantities", quantities, Sequence, Mapping)
     check_type("predict", "command", command, Command, NoneType)
+    threads_for(workers, source="predict")
     given = [quantities] if isinstance(quantities, str) else quantities
     measures = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
     if not measures:

@@ -1,0 +1,164 @@
+"""What holds evolution back, and what the oscillators that it finds can do.
+
+    python runs/oscillators.py [--page | NAME ...]
+
+Evolves each experiment of oscillators/experiments.yaml in ten trials, in out/runs, and judges the
+best gaits: at the same peak of the signals, on disturbed robots, on rough ground and on steps.
+trials.jsonl in the folder oscillators/ gets a line for each trial; experiments that are there are
+skipped. Then the script writes the page README.md and its figure.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from page import rendered
+from record import SCRATCH, load_experiments
+from records import append, read
+
+from tetra_drake.engines.simulate import simulate_many
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.run import Run
+from tetra_drake.experiment import evolve
+from tetra_drake.figures.style import save_figure
+from tetra_drake.files import write_whole
+from tetra_drake.lab.study.robustness import PERCENT, by_gait, robustness
+from tetra_drake.optimizers import optimizer_of
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.parameter_space import ParameterSpace
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.optimizer_kinds import CmaEs
+from tetra_drake.scenario.scenario import Scenario
+
+HERE = Path(__file__).parent / "oscillators"
+RECORDS = "trials.jsonl"
+EXPERIMENTS = load_experiments(HERE / "experiments.yaml")
+PEAK = 2.16
+"""Peak (N) of the signals at which distances are compared."""
+BUDGETS = 1000, 2000, 4000
+"""Numbers of gaits after which the best ones of a trial are judged."""
+TIMES = np.arange(5.0, 15.0, 0.01)
+"""Times (s) of the signals whose peak, frequency and lags are given."""
+
+
+def alike(space: ParameterSpace, evolution: Any, generator: np.random.Generator) -> Any:
+    """CMA-ES over gaits whose weights are equal where oscillators are equally far apart: a weight
+    is the first one with its distance and its kind of neurons."""
+    keys = list[tuple[object, ...]]()
+    for name in space.names:
+        pair = re.fullmatch(r"weight (\d+)->(\d+) (\w+)", name)
+        keys.append((int(pair[1]) - int(pair[2]), pair[3]) if pair else (name,))
+    first = np.array([keys.index(key) for key in keys])
+    is_free = first == np.arange(len(first))
+    fewer = dataclasses.replace(space, high=np.where(is_free, space.high, space.low))
+    inner = optimizer_of(CmaEs())(fewer, evolution, generator)
+    return SimpleNamespace(ask=lambda: [each[first] for each in inner.ask()], tell=inner.tell)
+
+
+def evolved(name: str) -> Run:
+    """The run of an experiment in SCRATCH, evolved to its end."""
+    scenario, out = EXPERIMENTS[name].scenario(name), SCRATCH / name
+    resume, optimizer = (out / MANIFEST).exists(), alike if name == "alike" else None
+    return evolve(scenario, out, resume=resume, optimizer=optimizer, reevaluate=False, report=False)
+
+
+def wave(scenario: Scenario, gait: Gait) -> tuple[float, float, np.ndarray]:
+    """Peak (N), frequency (Hz) and lags (degrees) from each oscillator to the next of a gait's
+    signals."""
+    signals = DrivenRobot.of(Robot.of(scenario), gait).signals_at(TIMES)
+    spectrum = np.fft.rfft(signals - signals.mean(axis=0), axis=0)
+    strongest = int(np.abs(spectrum).sum(axis=1).argmax())
+    lags = np.degrees(-np.diff(np.angle(spectrum[strongest])))
+    frequency = float(np.fft.rfftfreq(len(TIMES), TIMES[1] - TIMES[0])[strongest])
+    return float(np.abs(signals).max()), frequency, np.mod(lags + 180.0, 360.0) - 180.0
+
+
+def judged(run: Run, trial: int) -> dict[str, Any]:
+    """What the best gait of a trial does. All distances (in) are at the same PEAK."""
+    table, scenario = run.evaluations[run.evaluations["trial"] == trial], run.scenario
+    best = [int(table["fitness"][table["index"] < budget].idxmax()) for budget in BUDGETS]
+    gaits = [run.gait(trial, int(table.loc[place, "index"])) for place in best]
+    peak, frequency, lags = wave(scenario, gaits[-1])
+    gains = [scenario.cpg.gain * PEAK / wave(scenario, gait)[0] for gait in gaits]
+    fair = [scenario.with_changes({"cpg.gain": f"{gain} N"}) for gain in gains]
+    grounds = [load_scenario(name).terrain for name in ("rough", "steps")]
+    others = [fair[-1].with_changes({"terrain": one, "robot.contacts": "all"}) for one in grounds]
+    walks = simulate_many([*fair, *others], [*gaits, gaits[-1], gaits[-1]])
+    *inches, rough, steps = [
+        round(walk.metrics.distance_in, 2) if isinstance(walk, SimulationResult) else None
+        for walk in walks
+    ]
+    draws = robustness(fair[-1], gaits[-1], percent=PERCENT, alone=False)
+    return {
+        "trial": trial,
+        "distances_in": inches,
+        "peak_n": round(peak, 3),
+        "frequency_hz": round(frequency, 2),
+        "lags_deg": [round(float(lag)) for lag in lags],
+        "rough_in": rough,
+        "steps_in": steps,
+        "kept": float(by_gait(draws)["kept"].iloc[0]),
+    }
+
+
+def numbers(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Numbers of the page: medians and ranges of the trials, by experiment."""
+    found = {}
+    for name in dict.fromkeys(one["experiment"] for one in records):
+        own = [one for one in records if one["experiment"] == name]
+        inches = np.array([one["distances_in"] for one in own])
+        spread = np.array([np.median(inches, 0), inches.min(0), inches.max(0)]).T
+        rest = ("peak_n", "frequency_hz", "rough_in", "steps_in", "kept")
+        medians = {key: float(np.median([one[key] for one in own])) for key in rest}
+        lags = np.median([one["lags_deg"] for one in own], axis=0)
+        found[name] = {"trials": inches[:, -1], "spread": spread, "lags": lags, **medians}
+    return found
+
+
+def trials_figure(found: dict[str, Any], line: float) -> Figure:
+    """Distances of all trials by experiment; the line is the best sine."""
+    figure = Figure(figsize=(8.0, 0.4 * len(found) + 1.0), layout="constrained")
+    axes = figure.subplots()
+    for place, each in enumerate(found.values()):
+        axes.plot(each["trials"], np.full(each["trials"].shape, place), "o", alpha=0.6, ms=4)
+    axes.axvline(line, color="0.7", linewidth=0.8)
+    axes.set_yticks(range(len(found)), [EXPERIMENTS[name].title for name in found])
+    axes.set(
+        xlabel=f"distance in 15 s at a peak of {PEAK} N, inches", ylim=(len(found) - 0.5, -0.5)
+    )
+    return figure
+
+
+def main(names: Sequence[str]) -> None:
+    """Makes what is missing, and writes the page."""
+    done = {one["experiment"] for one in read(HERE / RECORDS)}
+    for name in [] if "--page" in names else names or EXPERIMENTS:
+        if name not in done:
+            run = evolved(name)
+            lines = [judged(run, trial) for trial in range(run.scenario.evolution.trials)]
+            append(HERE / RECORDS, [{"experiment": name} | one for one in lines])
+            print(name, [one["distances_in"][-1] for one in lines], flush=True)
+    found = numbers(read(HERE / RECORDS))
+    sine = max(found["sine"]["trials"])
+    save_figure(trials_figure(found, sine), HERE, "trials", kinds=["svg"])
+    text = rendered("oscillators.md", experiments=EXPERIMENTS, found=found, sine=sine, peak=PEAK)
+    write_whole(HERE / "README.md", text)
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1:])
+    except InputError as error:
+        sys.exit(f"oscillators.py: {error}")

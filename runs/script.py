@@ -1,0 +1,59 @@
+"""What the scripts of this folder have in common: command line, settings, records, evolution."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.progress import Progress
+from tetra_drake.evolution.run import Run
+from tetra_drake.experiment import evolve
+from tetra_drake.files import read_json, read_text
+from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.yaml_text import parse_yaml
+
+T = TypeVar("T")
+
+
+def run_script(main: Callable[[Sequence[str]], None]) -> None:
+    """Runs a script with its arguments, or shows its docstring for --help. An InputError and an
+    interrupt end it with one line."""
+    name, arguments = Path(sys.argv[0]).name, sys.argv[1:]
+    if {"-h", "--help"} & {*arguments}:
+        sys.exit(sys.modules["__main__"].__doc__)
+    try:
+        with heeding_interrupts():
+            main(arguments)
+    except InputError as error:
+        sys.exit(f"{name}: {error}")
+    except KeyboardInterrupt:
+        sys.exit(f"{name}: interrupted; the same command goes on")
+
+
+def read_settings(file: Path) -> Any:
+    """Content of a YAML file. Raises InputError if it cannot be read."""
+    return parse_yaml(read_text(file, "settings"), file)
+
+
+def read_record(path: Path, use: Callable[[Any], T], command: str) -> T:
+    """What a function makes of a record in JSON. Raises InputError, which names the command that
+    makes the record, if it is missing or damaged."""
+    content = read_json(path, f"record; run `python runs/{command}`")
+    try:
+        return use(content)
+    except (InputError, AttributeError, LookupError, TypeError, ValueError) as error:
+        problem = f"cannot be read ({error!r}); run `python runs/{command}`"
+        raise InputError(path, "", problem) from error
+
+
+def evolved(scenario: Scenario, folder: Path) -> Run:
+    """Run of a scenario in a folder, evolved as far as it is not yet."""
+    resume, progress = (folder / MANIFEST).exists(), Progress(sys.stdout)
+    return evolve(
+        scenario, folder, resume=resume, reevaluate=False, report=False, progress=progress
+    )
