@@ -226,7 +226,9 @@ def linearize(
     if state is None and left > BALANCED * greatest:
         problem = "does not rest on this terrain with these actuators; give a state"
         raise InputError(robot.scenario.name, "robot", problem)
-    A, *matrices = _matrices(robot, at, fixed, outputs, of_signals=min(greatest, 0.5 * least / STEP))
+    A, *matrices = _matrices(
+        robot, at, fixed, outputs, of_signals=min(greatest, 0.5 * least / STEP)
+    )
     if not all(np.isfinite(matrix).all() for matrix in (A, *matrices)):
         raise InputError("linearize", "state", "found a state whose forces are not finite")
     resisted = _resisted_states(robot, at, A)
