@@ -50,7 +50,7 @@ ACCURATE = {
 
 
 def trajectory_of(robot: Robot, engine: str):
-    """The trajectory of a robot that starts at rest, on an engine, accurate if it has no settings."""
+    """The trajectory of a robot from rest, on an engine, which is accurate without settings."""
     changes = {"engine": ACCURATE.get(engine, engine), "friction.stiffness": "0 N/m"}
     robot = dataclasses.replace(robot, scenario=robot.scenario.with_changes(changes))
     walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, 3))
