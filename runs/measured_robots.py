@@ -10,7 +10,7 @@ import numpy as np
 import pandas
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.lab.fit.fit import Fit, fit_values
+from tetra_drake.lab.fit.fit import Fit, fit
 from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.lab.predict.variates import variates_of
 from tetra_drake.lab.study.equilibrium import study_equilibrium
@@ -171,7 +171,7 @@ def simplex_heights(most_load: float = 1.01) -> list[Rest]:
 def fitted_free_lengths(*groups: str) -> Fit:
     """Free lengths of groups of the simplex's cables, fitted to its measured heights."""
     bounds = {f"robot.cables.{group}.free_length": ("2035 mm", "2050 mm") for group in groups}
-    return fit_values(simplex(1.5), simplex_heights(), bounds)
+    return fit(simplex(1.5), simplex_heights(), bounds)
 
 
 def vibrating(scenario: Scenario) -> Scenario:

@@ -141,6 +141,17 @@ def trials_figure(found: dict[str, Any], line: float) -> Figure:
     return figure
 
 
+def farthest_sine(found: dict[str, Any]) -> float:
+    """Distance (in) of the farthest sine of two numbers."""
+    return float(max(found["sine"]["trials"]))
+
+
+def page(found: dict[str, Any]) -> str:
+    """Text of the page from numbers()."""
+    sine = farthest_sine(found)
+    return rendered("oscillators.md", experiments=EXPERIMENTS, found=found, sine=sine, peak=PEAK)
+
+
 def main(names: Sequence[str]) -> None:
     """Makes what is missing, and writes the page."""
     done = {one["experiment"] for one in read(HERE / RECORDS)}
@@ -151,10 +162,8 @@ def main(names: Sequence[str]) -> None:
             append(HERE / RECORDS, [{"experiment": name} | one for one in lines])
             print(name, [one["distances_in"][-1] for one in lines], flush=True)
     found = numbers(read(HERE / RECORDS))
-    sine = max(found["sine"]["trials"])
-    save_figure(trials_figure(found, sine), HERE, "trials", kinds=["svg"])
-    text = rendered("oscillators.md", experiments=EXPERIMENTS, found=found, sine=sine, peak=PEAK)
-    write_whole(HERE / "README.md", text)
+    save_figure(trials_figure(found, farthest_sine(found)), HERE, "trials", kinds=["svg"])
+    write_whole(HERE / "README.md", page(found))
 
 
 if __name__ == "__main__":

@@ -122,6 +122,11 @@ class Way:
         missing = np.maximum(0.0, MARGIN - clearance(readings.p_WN, self.pillars))
         return np.asarray(cost + PENALTY * missing.max(axis=0))
 
+    def found(self, p_WN: np.ndarray) -> Record:
+        """What its record has, of nodes (times, nodes, 3): places, pillars and least clearance."""
+        least = {"clearance": float(clearance(p_WN, self.pillars).min())} if self.pillars else {}
+        return {"places": self.places, "pillars": self.pillars, **least}
+
     def is_done(self, readings: Readings) -> bool:
         """True if the robot is at the last place of its way."""
         away = centre_of(readings.p_WN) - np.asarray(self.places[self.passed])
@@ -136,6 +141,10 @@ class Ahead:
 
     def __call__(self, readings: Readings) -> np.ndarray:
         return np.asarray(-readings.p_WN[-1, ..., 0].mean(axis=-1))
+
+    def found(self, p_WN: np.ndarray) -> Record:
+        """Nothing else."""
+        return {}
 
     def is_done(self, readings: Readings) -> bool:
         """False: it goes on until the time is over."""
@@ -157,6 +166,10 @@ class Turn:
 
     def __call__(self, readings: Readings) -> np.ndarray:
         return self.error(readings.p_WN)
+
+    def found(self, p_WN: np.ndarray) -> Record:
+        """The angle (rad) that is left."""
+        return {"error": float(self.error(p_WN[-1]))}
 
     def is_done(self, readings: Readings) -> bool:
         """True within 5 degrees."""
@@ -310,53 +323,38 @@ def run_episode(episode: Episode) -> tuple[Record, SimulationResult]:
     longer = scenario.with_numbers({"simulation.duration": episode.most + period})
     with contextlib.suppress(Over):
         simulate(longer, controller=act, control_period=period)
-    result = play(scenario, actions, period=period)
-    record = recorded(episode, task, result, cpu, is_done=is_done)
-    wall = [round(each, 3) for each in planner.wall_times]
-    record |= {"wall": wall, "load": round(load, 1)}
+    short = scenario.with_changes({"simulation.duration": f"{period * len(actions):.6g} s"})
+    result = simulate(
+        short,
+        controller=lambda now, _: actions[round(now / period)],
+        control_period=period,
+        record=True,
+    )
+    record = recorded(episode, result) | task.found(result.trajectory.p_WN.values)
+    record |= {"is_done": is_done, "cpu": cpu, "wall": planner.wall_times, "load": load}
+    record |= {key: np.round(record[key], 3).tolist() for key in ("cpu", "wall", "load")}
     if command is not None:
         alone = simulate(scenario, command=command)
         record["command_speed"] = alone.metrics.relative_speed
     return record, result
 
 
-def play(scenario: Scenario, actions: Sequence[np.ndarray], *, period: float) -> SimulationResult:
-    """Result of a robot after actions, each for a period (s)."""
-    short = scenario.with_changes({"simulation.duration": f"{period * len(actions):.6g} s"})
-    again = lambda now, _: actions[round(now / period)]  # noqa: E731
-    return simulate(short, controller=again, control_period=period, record=True)
-
-
-def recorded(
-    episode: Episode, task: Task, result: SimulationResult, cpu: list[float], *, is_done: bool
-) -> Record:
-    """Record of an episode, in SI units."""
-    nodes, metrics = result.trajectory.p_WN.values, result.metrics
-    times = result.trajectory.time.values
-    period = episode.settings["control_period"]
-    steps = centre_of(nodes)[:: round(period / float(times[1] - times[0]))]
-    centre = result.path.centre
+def recorded(episode: Episode, result: SimulationResult) -> Record:
+    """Record of the motion of an episode, in SI units."""
+    trajectory, metrics, centre = result.trajectory, result.metrics, result.path.centre
+    every = round(episode.settings["control_period"] / float(np.diff(trajectory.time[:2])[0]))
+    steps = centre_of(trajectory.p_WN.values)[::every]
     away = float(np.linalg.norm((centre[-1] - centre[0])[:2]))
-    record = {
+    return {
         "group": episode.group,
         "name": episode.name,
-        "is_done": is_done,
         "time": result.duration,
         "way": float(np.linalg.norm(np.diff(steps, axis=0), axis=1).sum()),
         "cost_of_transport": metrics.cost_of_transport,
         "work": metrics.cost_of_transport * result.robot.weight * away,
         "relative_speed": metrics.relative_speed,
-        "speed": metrics.speed,
-        "cpu": [round(each, 3) for each in cpu],
         "path": steps.round(3).tolist(),
     }
-    if isinstance(task, Way):
-        record |= {"places": task.places, "pillars": task.pillars}
-        if task.pillars:
-            record["clearance"] = float(clearance(nodes, task.pillars).min())
-    if isinstance(task, Turn):
-        record["error"] = float(task.error(nodes[-1]))
-    return record
 
 
 def run_all(episodes: Sequence[Episode], folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import random
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,6 +32,12 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     option = session.config.option
     if getattr(option, "numprocesses", 0) and not option.collectonly:
         prepare()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Shuffles the tests by the seed in the variable ORDER, if there is one."""
+    if seed := os.environ.get("ORDER"):
+        random.Random(seed).shuffle(items)
 
 
 @pytest.fixture(scope="session")

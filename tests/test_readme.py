@@ -214,7 +214,7 @@ def test_the_roads_name_what_the_files_have() -> None:
 RUNS = (
     "runs",
     *(f"runs/{name}" for name in EXPERIMENTS if (CHECKOUT / "runs" / name).is_dir()),
-    *("runs/bench", "runs/damage", "runs/measured", "runs/planning"),
+    *("runs/bench", "runs/damage", "runs/measured", "runs/oscillators", "runs/planning"),
 )
 """Runs of one's own may lie beside the recorded ones."""
 LINK = re.compile(r'(?:\]\(|src="|href=")([^)"]+)')

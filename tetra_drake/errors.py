@@ -83,8 +83,9 @@ def check_whole(
 def check_type(source: object, key: str, value: object, *kinds: Any) -> None:
     """Raises InputError unless a value has one of the types `kinds`. True and False do not count as
     numbers. `source` and `key` tell the error where the value was given."""
-    is_truth = isinstance(value, bool) and bool not in kinds
-    if is_truth or not isinstance(value, kinds):
+    is_wrong = isinstance(value, bool) and bool not in kinds
+    is_wrong |= isinstance(value, int) and value.bit_length() > 1000  # no float can have it
+    if is_wrong or not isinstance(value, kinds):
         expected = " or ".join(_IN_WORDS.get(kind, kind.__name__) for kind in kinds)
         raise InputError(source, key, f"found {value!r:.60}, expected {expected}")
 

@@ -10,7 +10,6 @@ from helpers import joined
 from helpers.anchored import TREES, scenario_of
 from helpers.meshcat_page import read_page
 
-from tetra_drake.lab.study import equilibrium
 from tetra_drake.lab.study.equilibrium import (
     robot_of_file,
     save_structure_page,
@@ -132,10 +131,3 @@ def test_struts_that_overlap_and_nodes_below_the_ground_are_named():
     study = study_equilibrium(Robot.of(hanging))
     assert study.nodes["z"].idxmin() == "p"
     assert f"p ({hanging.units.shown(-study.nodes['z'].min(), 'm')})" in structure_text(study)
-
-
-@pytest.mark.parametrize("name", ["six_bar", "mast"])
-def test_the_lowest_frequencies_are_the_first_of_all(monkeypatch, name):
-    study = study_equilibrium(name)
-    monkeypatch.setattr(equilibrium, "_LARGE", 0)
-    assert study.lowest_frequencies(4) == pytest.approx(study.frequencies[:4], rel=1e-6)

@@ -312,15 +312,15 @@ class Simulation:
         if len(states) not in (1, len(which)):
             problem = f"found {len(states)} states, expected one, or one for each of {len(which)}"
             raise InputError("Simulation", "states", problem)
+        for name, table in {**self._batch.save([0], history=False), "pause": np.zeros(1)}.items():
+            given = states.tables.get(name, np.zeros(0))
+            if (given.dtype, given.shape) != (table.dtype, (len(states), *table.shape[1:])):
+                raise InputError("Simulation", f"states.{name}", "is no table of states")
         count = len(which)
         own = {
             name: np.broadcast_to(table, (count, *table.shape[1:]))
             for name, table in states.tables.items()
         }
-        for name, table in {**self._batch.save([0], history=False), "pause": np.zeros(1)}.items():
-            given = states.tables.get(name, np.zeros(0))
-            if (given.dtype, given.shape) != (table.dtype, (len(states), *table.shape[1:])):
-                raise InputError("Simulation", f"states.{name}", "is no table of states")
         identities = states.robots * (count // len(states) if len(states) else 0)
         steps = self._steps_until(own["pause"])
         with self._used("restore"):

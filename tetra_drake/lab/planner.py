@@ -115,7 +115,7 @@ class Planner:
         """
         source, scenario = "Planner", given_scenario(scenario).on_engine("compiled")
         self._samples = check_whole(source, "samples", samples, least=2)
-        self._knots = check_whole(source, "knots", knots, least=2)
+        self._knots = check_whole(source, "knots", knots, least=2, most=MOST_STEPS)
         self._seed = check_whole(source, "seed", seed, least=0)
         check_type(source, "delayed", delayed, bool)
         check_type(source, "cost", cost, Callable, Mapping)

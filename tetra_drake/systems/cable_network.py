@@ -141,6 +141,7 @@ class CableNetwork(ConvertibleSystem):
         check_parameters("SetLaw", self, context)
         check_type("SetLaw", "law", law, cable.CableLaw)
         count, own = len(self._names), self.GetLaw(context).curve
+        check_type("SetLaw", "law.curve", law.curve, cable.Curve)
         curve = np.ravel(law.curve.rows if law.curve.pieces else own.rows)
         numbers = [
             numbers_for_each("SetLaw", key, getattr(law, key), count=count, least=0.0)

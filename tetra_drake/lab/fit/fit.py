@@ -184,43 +184,44 @@ def fit(
     Raises:
         InputError: names what cannot be used.
     """
+    from scipy.optimize import least_squares
+
+    began = time.perf_counter()
     check_type("fit", "say", say, Callable)
     folder = None if out is None else given_path(out, "fit", "out")
     if folder is not None:
         check_folder(folder)
         if (folder / SCENARIO).exists() and not (folder / KEPT_EVALUATIONS).exists():
             raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
-    found = fit_values(
-        given_scenario(scenario),
-        measurements,
-        parameters,
-        search=search,
-        folder=folder,
-        say=say,
-        source=source,
+    given = FitFile.from_tree({"parameters": parameters, "measurements": measurements}, source)
+    problem = _problem(given_scenario(scenario), given, folder, say, source)
+    start = problem.start
+    if not np.isfinite(problem.residuals(start)).all():
+        what = "is not simulated, or lacks equilibrium or frequencies, with the start values"
+        raise InputError(problem.scenario.name, "", what)
+
+    solution = least_squares(
+        problem.residuals,
+        _searched(problem, start) if search else start,
+        jac=problem.jacobian,
+        bounds=problem.bounds,
+        x_scale="jac",
+        ftol=2.0 * NEGLIGIBLE / problem.values.size,
+        xtol=TOLERANCE,
+        gtol=np.finfo(float).eps,  # without it, no influence and no residual give NaN
     )
+    found = _result(problem, start, solution.x, time.perf_counter() - began)
     if folder is not None:
         save_fit(found, folder)
     return found
 
 
-def fit_values(
-    scenario: Scenario,
-    measurements: Sequence[Measurement],
-    parameters: Mapping[str, Bounds],
-    *,
-    search: bool = False,
-    folder: Path | None = None,
-    say: Say = silent,
-    source: object = "fit",
-) -> Fit:
-    """Fit of fit(), without its files. Another fit to the same data reads the predictions of each
-    simulated point in the `folder` in place of a simulation. Raises InputError if an argument
-    cannot be used, or the start cannot be simulated."""
-    from scipy.optimize import least_squares
-
-    began = time.perf_counter()
-    given = FitFile.from_tree({"parameters": parameters, "measurements": measurements}, source)
+def _problem(
+    scenario: Scenario, given: FitFile, folder: Path | None, say: Say, source: object
+) -> FitProblem:
+    """The problem of a fit. Another fit to the same data reads the predictions of each simulated
+    point in the `folder` in place of a simulation. Raises InputError, naming `source` or a
+    measurement, if something cannot be used."""
     fitted = [parameter_of(scenario, key, each, source) for key, each in given.parameters.items()]
     measured = [
         each.read(scenario, f"measurement {number}")
@@ -238,27 +239,7 @@ def fit_values(
         digest.update(f"{type(measurement).tag} {settings}".encode())
         for key, path in files.items():
             digest.update(key.encode() + read_bytes(path, key))
-
-    problem = FitProblem(scenario, fitted, measured, digest.hexdigest(), folder, say)
-    start = problem.start
-    if not np.isfinite(problem.residuals(start)).all():
-        what = "is not simulated, or lacks equilibrium or frequencies, with the start values"
-        raise InputError(scenario.name, "", what)
-
-    solution = least_squares(
-        problem.residuals,
-        _searched(problem, start) if search else start,
-        jac=problem.jacobian,
-        bounds=problem.bounds,
-        x_scale="jac",
-        ftol=2.0 * NEGLIGIBLE / numbers,
-        xtol=TOLERANCE,
-        gtol=np.finfo(float).eps,  # without it, no influence and no residual give NaN
-    )
-    result = _result(problem, start, solution.x, time.perf_counter() - began)
-    if not solution.success:
-        result.warnings.append(f"least squares have not converged: {solution.message}")
-    return result
+    return FitProblem(scenario, fitted, measured, digest.hexdigest(), folder, say)
 
 
 def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:
@@ -305,13 +286,14 @@ def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: fl
     if is_wrong:
         largest = f"{math.sqrt(squares.max()):.3g} standard deviations for {squares.idxmax()}"
         warnings.insert(0, WRONG.format(misfit=misfit, largest=largest))
+    again = problem.predictions(x)
     return Fit(
         scenario=problem.scenario_at(x),
         parameters=table,
         correlations=correlations,
         residuals=problem.numbers.assign(start=predicted[0], fitted=predicted[1]),
-        clock_offsets=problem.clock_offsets(x),
-        placement=problem.notes(x),
+        clock_offsets={name: each.clock_offset for name, each in again.items()},
+        placement={name: each.notes for name, each in again.items()},
         misfit=misfit,
         start_misfit=problem.misfit(first),
         warnings=warnings,

@@ -85,8 +85,6 @@ class Measured:
     list; measured; uncertainty, its standard deviation."""
     predict: Callable[[Sequence[Scenario]], list[Prediction]]
     """What scenarios predict; NaN if a scenario cannot be simulated."""
-    has_notes: bool = False
-    """Whether predictions have notes."""
 
 
 class _Placed(Section):
@@ -173,7 +171,7 @@ class MotionCapture(_Placed):
             "uncertainty": [self.uncertainty] * len(row) + [self.marker_offset] * len(offsets),
         }
         predict = functools.partial(self.predict, driver=driver, log=table)
-        return Measured(f"{name}, {Path(self.log).name}", pandas.DataFrame(numbers), predict, True)
+        return Measured(f"{name}, {Path(self.log).name}", pandas.DataFrame(numbers), predict)
 
     def _named(self, log: pandas.DataFrame, structure: Structure) -> pandas.DataFrame:
         """The log with all coordinates of its nodes as columns. Raises InputError for a wrong name

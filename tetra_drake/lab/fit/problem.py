@@ -16,7 +16,7 @@ import pandas
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say
-from tetra_drake.lab.fit.measurements import Measured
+from tetra_drake.lab.fit.measurements import Measured, Prediction
 from tetra_drake.lab.predict.variates import variates_of
 from tetra_drake.lab.study.sweep import with_joined_changes
 from tetra_drake.scenario.joined_keys import separate
@@ -34,7 +34,7 @@ SEAL = 32
 """Size of the digest in the file of an evaluation, in bytes."""
 KEPT_EVALUATIONS = "evaluations"
 """Name of the folder that keeps the evaluations of a fit. A file has a digest of its name and
-numbers, then the numbers: for each measurement the predicted ones and the offset of the clock."""
+numbers, then the numbers: the predicted ones of all measurements."""
 
 Bounds = Sequence[str | float]
 
@@ -138,8 +138,6 @@ class FitProblem:
         self.numbers = pandas.concat(tables, ignore_index=True)
         self.values = self.numbers["measured"].to_numpy(dtype=float)
         self.uncertainty = self.numbers["uncertainty"].to_numpy(dtype=float)
-        # An evaluation has the predicted numbers of each measurement, then the clock's offset.
-        self._clocks = np.cumsum([len(table) + 1 for table in tables]) - 1
         self.start = np.array([each.start for each in self.parameters]) / self.scale
         weights = self.scale / np.array([each.prior for each in self.parameters])
         self.tolerances = np.diag(weights)[weights > 0.0]
@@ -170,20 +168,13 @@ class FitProblem:
 
     def residuals_at(self, x: np.ndarray) -> np.ndarray:
         """Weighted residuals (numbers,) at a point that was evaluated before; simulates nothing."""
-        predicted = np.delete(self._known[self._name(x)], self._clocks)
-        residuals: np.ndarray = (predicted - self.values) / self.uncertainty
+        residuals = (self._known[self._name(x)] - self.values) / self.uncertainty
         return np.append(residuals, self.tolerances @ (x - self.start))
 
-    def clock_offsets(self, x: np.ndarray) -> dict[str, float]:
-        """Time (s) by which the clock of each measurement is ahead of the simulated time, by the
-        name of the measurement, at a point `x` that was evaluated before."""
-        offsets = self._known[self._name(x)][self._clocks].tolist()
-        return dict(zip([each.name for each in self.measured], offsets, strict=True))
-
-    def notes(self, x: np.ndarray) -> dict[str, Sequence[str]]:
-        """Prediction.notes by measurement at the point `x`, which is simulated again for them."""
-        logs, scenarios = [each for each in self.measured if each.has_notes], [self.scenario_at(x)]
-        return {each.name: each.predict(scenarios)[0].notes for each in logs}
+    def predictions(self, x: np.ndarray) -> dict[str, Prediction]:
+        """What each measurement predicts at the point `x`, by its name, with the clock and notes of
+        logs. All are simulated again."""
+        return {each.name: each.predict([self.scenario_at(x)])[0] for each in self.measured}
 
     def sums_of_squares(self, points: np.ndarray) -> np.ndarray:
         """Sums (k,) of the squares of the weighted residuals at k points (k, n), which are
@@ -243,7 +234,7 @@ class FitProblem:
         scenarios = [self.scenario_at(point) for point in unknown.values()]
         by_measurement = [each.predict(scenarios) for each in self.measured]
         for name, predictions in zip(unknown, zip(*by_measurement, strict=True), strict=True):
-            numbers = np.concatenate([[*each.values, each.clock_offset] for each in predictions])
+            numbers = np.concatenate([each.values for each in predictions])
             self._known[name] = numbers
             if name in files:
                 write_whole(files[name], _seal(name, numbers.tobytes()) + numbers.tobytes())

@@ -203,6 +203,8 @@ def predict(
     check_type("predict", "command", command, Command, NoneType)
     threads_for(workers, source="predict")
     given = [quantities] if isinstance(quantities, str) else quantities
+    for name in given:
+        check_type("predict", "quantities", name, str)
     measures = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
     if not measures:
         raise InputError("predict", "quantities", "found none, expected one at least")

@@ -50,7 +50,7 @@ from tetra_drake.settings.refusals import no_such
 from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
 
 _LARGE = 50
-"""Number of bodies from which the lowest frequencies are computed without the others."""
+"""Number of bodies from which modes are not computed."""
 _FREQUENCIES = 5
 """Number of natural frequencies that are printed."""
 _SWING, _STILL, _AMPLITUDE = 75, 2, 0.12
@@ -95,15 +95,10 @@ class EquilibriumStudy:
 
     @functools.cached_property
     def frequencies(self) -> np.ndarray:
-        """Natural frequencies without damping, in Hz, ascending. Nodes on the ground slide freely.
-        For hundreds of bodies, lowest_frequencies() is faster."""
-        return _frequencies(self.robot)
-
-    def lowest_frequencies(self, count: int = _FREQUENCIES) -> np.ndarray:
-        """The lowest of `frequencies`, at most `count` (frequencies,), in Hz."""
-        if len(self.robot.structure.bodies) < _LARGE:
-            return self.frequencies[:count]
-        return _frequencies(self.robot, among=[0, count - 1])
+        """Natural frequencies without damping (modes,) in Hz, ascending. Feet slide freely."""
+        stiffness, mass, count = _vibration(self.robot, Unactuated(self.robot.model))
+        squares = linalg.eigvalsh(stiffness, mass)[:count]
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))
 
     @functools.cached_property
     def modes(self) -> np.ndarray:
@@ -168,13 +163,6 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     }
     table = pandas.DataFrame(cables, index=list(structure.cable_names))
     return EquilibriumStudy(robot=robot, nodes=nodes, cables=table)
-
-
-def _frequencies(robot: Robot, among: list[int] | None = None) -> np.ndarray:
-    """Natural frequencies in Hz, ascending; only those with indices from among[0] to among[1]."""
-    stiffness, mass, count = _vibration(robot, Unactuated(robot.model))
-    squares = linalg.eigvalsh(stiffness, mass, subset_by_index=among)[:count]
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))
 
 
 def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray, int]:
@@ -253,7 +241,7 @@ def structure_text(study: EquilibriumStudy) -> str:
     robot, statics, structure = study.robot, study.statics, study.robot.structure
     units = robot.scenario.units
     length, force = units.length_name, units.force_name
-    lowest = ", ".join(f"{frequency:.3g}" for frequency in study.lowest_frequencies())
+    lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
     slides = ground = sticks = ""
     if structure.contacts.size:
         stiffness = units.shown(robot.scenario.ground.stiffness, "N/m")

@@ -1,0 +1,17 @@
+"""The study of oscillators: its page, and what its records say."""
+
+import oscillators
+from records import read
+
+RECORDS = read(oscillators.HERE / oscillators.RECORDS)
+
+
+def test_the_page_shows_its_records():
+    page = (oscillators.HERE / "README.md").read_text(encoding="utf-8")
+    assert oscillators.page(oscillators.numbers(RECORDS)) == page
+
+
+def test_phase_oscillators_pass_the_farthest_sine_in_at_least_eight_of_ten_trials():
+    found = oscillators.numbers(RECORDS)
+    trials = found["phases"]["trials"]
+    assert trials.size == 10 and (trials > oscillators.farthest_sine(found)).sum() >= 8
