@@ -301,12 +301,6 @@ def planned(rows: Sequence[Row]) -> pandas.DataFrame:
     return table.assign(share=table["speed"] / gait, own=table["speed"] / whole)
 
 
-def by_cable(shares: pandas.DataFrame, plans: pandas.DataFrame) -> pandas.DataFrame:
-    """Numbers of each cable, left and right ones together."""
-    medians = shares.groupby("group", sort=False)[["lost", "found", "trials"]].median()
-    return medians.assign(planner=plans.groupby("group")["share"].mean())
-
-
 _PLANNER: Any = {"color": "black", "marker": "x", "linestyle": "", "markersize": 4.0}
 
 
@@ -360,7 +354,6 @@ def page(walks: Sequence[Row], plan_rows: Sequence[Row], candidates: Sequence[Ro
         plans=by_plan[~is_whole],
         whole=by_plan[is_whole].iloc[0],
         cpu=by_plan["cpu_s"].median(),
-        cables=by_cable(shares, by_plan),
         steady=scenario().simulation.settling_time,
         set=SET,
     )
