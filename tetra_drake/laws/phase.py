@@ -78,12 +78,12 @@ def phase_outputs(states: Table, outputs: Table, law: PhaseConstants) -> None:
 
 
 class PhaseOscillators(CpgKind):
-    """Settings of phase oscillators with controlled amplitudes. Frequency, amplitudes, lags and
-    coupling are parameters of a gait; here are their bounds in random gaits, and equal bounds fix
-    them. With fixed amplitudes, common lags and a fixed coupling, a gait is a travelling sine.
+    """Settings of phase oscillators with controlled amplitudes.
 
-    The oscillators start with their lags and without amplitude. The signal of the first one rises
-    through 0 at the start-up time.
+    Frequency, amplitudes, lags and coupling are parameters of a gait; here are their bounds in
+    random gaits, and equal bounds fix them. With fixed amplitudes and coupling and common lags a
+    gait is a travelling sine. The oscillators start with their lags and without amplitude; the
+    first one rises through 0 at the start-up time.
     """
 
     tag = "Phase"
