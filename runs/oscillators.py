@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,12 +22,11 @@ from matplotlib.figure import Figure
 from page import rendered
 from record import SCRATCH, load_experiments
 from records import append, read
+from script import evolved, run_script
+from sine import PERIOD, peak, steady_signals
 
 from tetra_drake.engines.simulate import simulate_many
-from tetra_drake.errors import InputError
-from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run
-from tetra_drake.experiment import evolve
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.lab.study.robustness import PERCENT, by_gait, robustness
@@ -36,8 +34,6 @@ from tetra_drake.optimizers import optimizer_of
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.parameter_space import ParameterSpace
-from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 from tetra_drake.scenario.scenario import Scenario
@@ -49,8 +45,6 @@ PEAK = 2.16
 """Peak (N) of the signals at which distances are compared."""
 BUDGETS = 1000, 2000, 4000
 """Numbers of gaits after which the best ones of a trial are judged."""
-TIMES = np.arange(5.0, 15.0, 0.01)
-"""Times (s) of the signals whose peak, frequency and lags are given."""
 
 
 def alike(space: ParameterSpace, evolution: Any, generator: np.random.Generator) -> Any:
@@ -67,22 +61,14 @@ def alike(space: ParameterSpace, evolution: Any, generator: np.random.Generator)
     return SimpleNamespace(ask=lambda: [each[first] for each in inner.ask()], tell=inner.tell)
 
 
-def evolved(name: str) -> Run:
-    """The run of an experiment in SCRATCH, evolved to its end."""
-    scenario, out = EXPERIMENTS[name].scenario(name), SCRATCH / name
-    resume, optimizer = (out / MANIFEST).exists(), alike if name == "alike" else None
-    return evolve(scenario, out, resume=resume, optimizer=optimizer, reevaluate=False, report=False)
-
-
-def wave(scenario: Scenario, gait: Gait) -> tuple[float, float, np.ndarray]:
-    """Peak (N), frequency (Hz) and lags (degrees) from each oscillator to the next of a gait's
-    signals."""
-    signals = DrivenRobot.of(Robot.of(scenario), gait).signals_at(TIMES)
+def wave(scenario: Scenario, gait: Gait) -> tuple[float, np.ndarray]:
+    """Frequency (Hz) and lags (degrees) from each oscillator to the next of a gait's signals."""
+    signals = steady_signals(scenario, gait)
     spectrum = np.fft.rfft(signals - signals.mean(axis=0), axis=0)
     strongest = int(np.abs(spectrum).sum(axis=1).argmax())
     lags = np.degrees(-np.diff(np.angle(spectrum[strongest])))
-    frequency = float(np.fft.rfftfreq(len(TIMES), TIMES[1] - TIMES[0])[strongest])
-    return float(np.abs(signals).max()), frequency, np.mod(lags + 180.0, 360.0) - 180.0
+    frequency = float(np.fft.rfftfreq(len(signals), PERIOD)[strongest])
+    return frequency, np.mod(lags + 180.0, 360.0) - 180.0
 
 
 def judged(run: Run, trial: int) -> dict[str, Any]:
@@ -90,8 +76,9 @@ def judged(run: Run, trial: int) -> dict[str, Any]:
     table, scenario = run.evaluations[run.evaluations["trial"] == trial], run.scenario
     best = [int(table["fitness"][table["index"] < budget].idxmax()) for budget in BUDGETS]
     gaits = [run.gait(trial, int(table.loc[place, "index"])) for place in best]
-    peak, frequency, lags = wave(scenario, gaits[-1])
-    gains = [scenario.cpg.gain * PEAK / wave(scenario, gait)[0] for gait in gaits]
+    frequency, lags = wave(scenario, gaits[-1])
+    peaks = [peak(scenario, gait) for gait in gaits]
+    gains = [scenario.cpg.gain * PEAK / each for each in peaks]
     fair = [scenario.with_changes({"cpg.gain": f"{gain} N"}) for gain in gains]
     grounds = [load_scenario(name).terrain for name in ("rough", "steps")]
     others = [fair[-1].with_changes({"terrain": one, "robot.contacts": "all"}) for one in grounds]
@@ -104,7 +91,7 @@ def judged(run: Run, trial: int) -> dict[str, Any]:
     return {
         "trial": trial,
         "distances_in": inches,
-        "peak_n": round(peak, 3),
+        "peak_n": round(peaks[-1], 3),
         "frequency_hz": round(frequency, 2),
         "lags_deg": [round(float(lag)) for lag in lags],
         "rough_in": rough,
@@ -157,7 +144,8 @@ def main(names: Sequence[str]) -> None:
     done = {one["experiment"] for one in read(HERE / RECORDS)}
     for name in [] if "--page" in names else names or EXPERIMENTS:
         if name not in done:
-            run = evolved(name)
+            optimizer = alike if name == "alike" else None
+            run = evolved(EXPERIMENTS[name].scenario(name), SCRATCH / name, optimizer)
             lines = [judged(run, trial) for trial in range(run.scenario.evolution.trials)]
             append(HERE / RECORDS, [{"experiment": name} | one for one in lines])
             print(name, [one["distances_in"][-1] for one in lines], flush=True)
@@ -167,7 +155,4 @@ def main(names: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"oscillators.py: {error}")
+    run_script(main)

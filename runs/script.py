@@ -14,6 +14,7 @@ from tetra_drake.evolution.run import Run
 from tetra_drake.experiment import evolve
 from tetra_drake.files import read_json, read_text
 from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.optimizers import MakeOptimizer
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import parse_yaml
 
@@ -51,9 +52,15 @@ def read_record(path: Path, use: Callable[[Any], T], command: str) -> T:
         raise InputError(path, "", problem) from error
 
 
-def evolved(scenario: Scenario, folder: Path) -> Run:
-    """Run of a scenario in a folder, evolved as far as it is not yet."""
-    resume, progress = (folder / MANIFEST).exists(), Progress(sys.stdout)
+def evolved(scenario: Scenario, folder: Path, optimizer: MakeOptimizer | None = None) -> Run:
+    """Run of a scenario in a folder, evolved as far as it is not yet, by the scenario's optimiser
+    or another."""
     return evolve(
-        scenario, folder, resume=resume, reevaluate=False, report=False, progress=progress
+        scenario,
+        folder,
+        resume=(folder / MANIFEST).exists(),
+        optimizer=optimizer,
+        reevaluate=False,
+        report=False,
+        progress=Progress(sys.stdout),
     )

@@ -11,7 +11,6 @@ Each table is in a Markdown file between two lines:
 from __future__ import annotations
 
 import functools
-import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -27,8 +26,7 @@ from PIL import Image
 from readings import RECORD, load_record
 from record import EXPERIMENTS, PICTURE
 from script import run_script
-from sine import RECORD as SINES
-from sine import TRIED
+from sine import TRIED, load_sines
 
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
@@ -237,7 +235,7 @@ def trials_table(name: str, runs: Runs) -> str:
         rows.append(row)
     apart_by = f"{rounded(APART / units.length, 1)} {units.length_word}"
     on_mujoco = bool(np.isfinite([row["mujoco"] for row in rows]).any())
-    sine = json.loads(read_text(SINES, "record")).get(name)
+    sine = load_sines().get(name)
     return rendered(
         "trials.md",
         rows=rows,

@@ -24,7 +24,7 @@ from page import rendered
 from record import load_times
 from script import read_record, run_script
 from settle import difference_of_means, numbers
-from sine import TRIED
+from sine import TRIED, load_sines
 from tables import aspect, best_gait
 from thesis_figures import save_figures
 
@@ -42,7 +42,6 @@ from tetra_drake.settings.units import INCH, POUND_FORCE, plainest
 HERE = Path(__file__).parent
 PAGE, FIGURES = HERE / "thesis/THESIS.md", HERE / "thesis/redrawn"
 NUMBERS = HERE / "thesis/simulated.json"
-SINES = HERE / "thesis/sine.json"
 FORMER = HERE / "thesis-reversal"
 
 sys.path.append(str(HERE.parent / "diagrams"))
@@ -219,7 +218,7 @@ def simulated_numbers(run: Run) -> dict[str, Any]:
 
 def page(run: Run, simulated: Mapping[str, Any]) -> str:
     """Text of the page, with simulated_numbers()."""
-    sines = read_json(SINES, "record; run `python runs/sine.py`")
+    sines = load_sines()
     tables = readings.tables_of(readings.load_record(readings.RECORD))
     return rendered(
         "thesis.md",

@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,10 +19,12 @@ import numpy as np
 import verification_references as references
 import yaml
 from page import rendered
+from pydrake.multibody.tree import RotationalInertia
+from script import run_script
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import read_text, write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.laws.cable import CableLaw, elastic_energy
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.results.result import SimulationResult
@@ -117,10 +118,10 @@ def energy_of(result: SimulationResult) -> tuple[Array, Array]:
         for time, (p, v) in enumerate(zip(p_WN[:, first:end], v_WN[:, first:end], strict=True)):
             rigid = rigid_motions(p - p_WB[time, body]).reshape(-1, 6)
             w, speed = np.split(np.linalg.lstsq(rigid, v.ravel(), rcond=1e-9)[0], 2)
-            xx, yy, zz, xy, xz, yz = structure.unit_inertia[body]
             turn = references.Rotation.from_quat(q[time, [1, 2, 3, 0]])
             own = turn.inv().apply(w)
-            spin = own @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ own
+            unit = RotationalInertia(*structure.unit_inertia[body]).CopyToFullMatrix3()
+            spin = own @ unit @ own
             motion[time] += 0.5 * structure.mass[body] * (speed @ speed + spin)
     return energy + motion, motion
 
@@ -281,10 +282,10 @@ def main(names: Sequence[str]) -> None:
         results[name] = {"size": found.get("size", 1.0), "engines": found["engines"]}
         print(name, results[name], flush=True)
     if names and file.exists():
-        results = json.loads(read_text(file, "results")) | results
+        results = read_json(file, "results") | results
     write_whole(file, json.dumps(results, indent=1) + "\n")
     write_page(results)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    run_script(main)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from pydrake.multibody.tree import RotationalInertia
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
@@ -179,9 +180,8 @@ def precession(times: Array, case: Case) -> Array:
     for mass, unit, q, arm in zip(
         structure.mass, structure.unit_inertia, structure.q_WB, arms, strict=True
     ):
-        xx, yy, zz, xy, xz, yz = mass * unit
         turn = Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix()
-        inertia += turn @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ turn.T
+        inertia += turn @ RotationalInertia(*(mass * unit)).CopyToFullMatrix3() @ turn.T
         inertia += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     first = case["first"]
     centre = structure.mass @ structure.p_WB / structure.mass.sum()

@@ -25,7 +25,7 @@ from tetra_drake.robot.structure import (
     PASSIVE_COLOUR,
     STRUT_COLOUR,
     Structure,
-    rotated,
+    turned_back,
 )
 from tetra_drake.robot.xml_elements import add_comment, add_element, xml_text
 from tetra_drake.scenario.engine_kinds import Mujoco
@@ -232,7 +232,7 @@ def _add_key(model: Element, structure: Structure, name: str, state: np.ndarray)
     poses, velocities = np.split(state, [7 * len(structure.bodies)])
     q_WB, p_WB = np.split(poses.reshape(-1, 7), [4], axis=1)
     w_WB, v_WB = np.split(velocities.reshape(-1, 6), 2, axis=1)
-    w_WB_B = rotated(q_WB * [1.0, -1.0, -1.0, -1.0], w_WB)
+    w_WB_B = turned_back(q_WB, w_WB)
     axes = np.array([_bar_axis(structure, body) for body in range(len(structure.bodies))])
     w_WB_B = w_WB_B - axes * (axes * w_WB_B).sum(axis=1, keepdims=True)
     motion = {"qvel": np.hstack([v_WB, w_WB_B])} if velocities.any() else {}

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.kernels.compiling import CALLED, inlined
+from tetra_drake.kernels.compiling import called, inlined
 from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, select
 
 PASSIVE = -1
@@ -229,7 +229,7 @@ def elastic_tension(stretch: Real, law: CableLaw) -> Real:
     return tension
 
 
-@functools.partial(inlined, options=CALLED)
+@called
 def tension_on_curve(stretch: Real, tension: Real, curve: Curve) -> Real:
     """Tension (N) of a cable's curve at a stretch (m); `tension` (N) before its first piece."""
     for piece in range(curve.pieces):
@@ -324,9 +324,8 @@ def tendon_faults(cables: Table, *, slack: bool) -> dict[str, Table]:
     """Cables that MuJoCo's tendons cannot imitate: for each reason a mask (cables,), True where it
     holds.
 
-    The keys are the reasons as sentences. `cables` is an array of a type of
-    cable_type(). `slack` is true if
-    cables go slack.
+    The keys are the reasons as sentences. `cables` is an array of a type of cable_type(). `slack`
+    is true if cables go slack.
     """
     is_damped = slack & (cables["damping"] != 0.0)
     is_cubic = np.array([tendon_coefficients(one["curve"]) is not None for one in cables], bool)

@@ -260,6 +260,12 @@ def rotated(q: np.ndarray, p: np.ndarray) -> np.ndarray:
     return np.asarray(p + scalar * turn + np.cross(vector, turn))
 
 
+def turned_back(q: np.ndarray, p_W: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) of the world in the frames of bodies with quaternions (..., 4), w first: the
+    inverse of rotated()."""
+    return rotated(q * [1.0, -1.0, -1.0, -1.0], p_W)
+
+
 def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:
     """Rates (times, cables) of the cables' lengths in m/s, from positions and velocities of the
     nodes (times, nodes, 3) in m and m/s."""

@@ -79,8 +79,8 @@ class RowCables(Section):
         """Constants (SI) of the force law of one cable of a junction, such as "outer top", by the
         names of laws.cable.CableLaw."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
-        own = {"damping": self.damping, "free_length": self.free_length}
-        return own | {"stiffness": stiffness}
+        free_length, damping = self.free_length, self.damping
+        return {"stiffness": stiffness, "damping": damping, "free_length": free_length}
 
 
 Spacing = Annotated[float, *quantity("m", balanced=0.0)]
