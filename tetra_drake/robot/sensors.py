@@ -61,7 +61,7 @@ class Sensors:
 
 def shown(exact: Readings, sensors: Mapping[int, Callable[[Readings], Readings]]) -> Readings:
     """Readings of robots (N, ...) as their sensors show them, written into the exact ones.
-    `sensors` has those of each robot by its row."""
+    `sensors` are by the row of their robot."""
     for row, own in sensors.items():
         exact.put(row, own(exact.rows(row)))
     return exact
