@@ -37,7 +37,7 @@ class EvolutionSection(Section):
     """Number of gaits that a trial evaluates at most: for !SteadyState its population, then two an
     iteration."""
     time_budget: Time = Field(gt=0)
-    """Longest wall time of a simulation; beyond, it counts as failed."""
+    """Longest CPU time of a simulation; beyond, it counts as failed."""
 
 
 Spread = Annotated[float, Field(gt=0, le=0.5)]
