@@ -125,6 +125,8 @@ IMPORTS = {
     # And so evaluators, which every worker imports.
     "tetra_drake.evolution.trials": HEAVY - {"numba", "scipy"},
     "tetra_drake.experiment": HEAVY - {"pydrake", "numba", "scipy"},
+    # The thesis's robot does not search for its equilibrium.
+    "tetra_drake.systems.diagram": {"pandas", "xarray", "tetra_drake.robot.equilibrium"},
 }
 """What each module must not import, from the lightest module to the heaviest."""
 

@@ -37,9 +37,10 @@ from tetra_drake.robot.equilibrium import (
 from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.remarks import BEARS, overload_remark, sinking_remark, yielding_remark
 from tetra_drake.robot.robot import Robot, equilibrium_of
+from tetra_drake.robot.settling import condensed
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import Structure, node_motions, node_positions
-from tetra_drake.robot.struts import MEETING, condensed, overlaps
+from tetra_drake.robot.struts import MEETING, overlaps
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
