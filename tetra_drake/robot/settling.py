@@ -1,5 +1,5 @@
-"""Robots that settle: equilibrium at the start, and how elastic struts change their lengths and
-vibrate. A robot that starts where its settings place it does not load this module.
+"""Robots that settle: equilibrium at the start, and how elastic struts change their lengths. A
+robot that starts where its settings place it does not load this module.
 
 A strut with an axial stiffness is a body of its own. It is straight, and its ends move along its
 axis. For the error of natural frequencies, see scenario.robot_structure.StrutGroup.
@@ -29,8 +29,6 @@ MOST_CORRECTIONS = 100
 """Largest number of corrections of the lengths of elastic struts, in the search for equilibrium."""
 SAME_LENGTH = 1e-10
 """Change (m) of an elastic strut's length below which no further correction is made."""
-ELONGATION = 1e-6
-"""Elongation of a strut for finite differences, as a share of its length."""
 
 
 def settled(scenario: World, placed: Structure, model: Model) -> tuple[Structure, Model]:
@@ -105,34 +103,3 @@ def elongated(structure: Structure, elongation: np.ndarray) -> np.ndarray:
         share = elongation[strut] / structure.strut_table.length[strut]
         p_BN[structure.struts[strut]] *= 1.0 + share
     return p_BN
-
-
-def condensed(
-    stiffness: np.ndarray, structure: Structure, unactuated: Unactuated, state: np.ndarray
-) -> np.ndarray:
-    """Stiffness matrix (6*n, 6*n) in N/m with the compliance of the elastic struts (static
-    condensation). `unactuated` is the same robot with its arrays of forces.
-
-    `stiffness` is the matrix of the n bodies as if rigid, from stiffness_at_rest(), in the
-    equilibrium `state` (13*n,). The elongations of the struts have no inertia: they follow the
-    displacements of the bodies at once.
-    """
-    elastic = elastic_struts(structure)
-    if not elastic.size:
-        return stiffness
-    coupling, own = np.empty((len(stiffness), elastic.size)), np.empty((elastic.size, elastic.size))
-    lengths = structure.strut_table.length
-    for column, strut in enumerate(elastic):
-        ends = []
-        for sign in (-1.0, 1.0):
-            elongation = np.zeros(len(lengths))
-            elongation[strut] = sign * ELONGATION * lengths[strut]
-            p_BN = elongated(structure, elongation)
-            longer = Unactuated(unactuated.model._replace(p_BN=p_BN))
-            axial = axial_forces(structure, longer, state)[elastic]
-            ends.append((force_at_rest(longer, state), axial))
-        step = 2.0 * ELONGATION * lengths[strut]
-        coupling[:, column] = (ends[0][0] - ends[1][0]) / step
-        own[:, column] = (ends[0][1] - ends[1][1]) / step
-    own += np.diag(structure.strut_stiffness[elastic])
-    return np.asarray(stiffness - coupling @ np.linalg.solve(own, coupling.T))
