@@ -37,36 +37,11 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 INPUTS, SEED, LONGEST = int(os.environ.get("INPUTS", "600")), int(os.environ.get("SEED", "0")), 20.0
 PRISM = td.load_scenario("prism").with_changes(BRIEF | {"engine": "!Compiled"})
 TREE = yaml.safe_load((Path(td.__file__).parent / "scenario/structures/prism.yaml").read_text())
-PLAIN = [
-    None,
-    True,
-    -1,
-    0,
-    2,
-    3.5,
-    math.nan,
-    math.inf,
-    1e300,
-    "",
-    "x",
-    "1 m",
-    "-3 N",
-    [],
-    {},
-    [1, 2],
-]
+PLAIN = [None, True, -1, 0, 2, 3.5, math.nan, math.inf, 1e300]
+PLAIN += ["", "x", "1 m", "-3 N", [], {}, [1, 2]]
 ODD = [*PLAIN, b"x", object(), np.zeros(3), np.full((6, 6), np.nan), {"a": 1}, [[math.nan] * 6]]
-ODD += [
-    lambda *_: None,
-    Path("/dev/zero"),
-    10**400,
-    (1, "a"),
-    Exception,
-    PRISM,
-    "--",
-    "<x/>",
-    "\x1b",
-]
+ODD += [lambda *_: None, Path("/dev/zero"), 10**400, (1, "a"), Exception, PRISM]
+ODD += ["--", "<x/>", "\x1b"]
 
 
 class Answers(ThreadPoolExecutor):

@@ -69,14 +69,6 @@ def test_self_stress_states_and_mechanisms(joined, self_stress_states, mechanism
     assert np.abs(balance).max(initial=0.0) < 1e-6
 
 
-def test_tensions_of_a_prism() -> None:
-    (tensions,) = find_statics(**prism(3, 30.0)).self_stresses
-    horizontal, side = tensions[:6], tensions[6:]
-    assert horizontal == pytest.approx(horizontal[0], rel=1e-9)
-    assert side == pytest.approx(side[0], rel=1e-9)
-    assert horizontal[0] / side[0] == pytest.approx(0.630, abs=5e-4)
-
-
 @pytest.mark.parametrize("name", ["mast", "pair"])
 def test_the_shipped_spines_balance_without_weight(name: str) -> None:
     blueprint, joined = read_structure(name).blueprint(), shipped(name)

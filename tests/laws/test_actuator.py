@@ -111,17 +111,3 @@ def test_a_motor_gives_what_its_data_sheet_says():
     assert winch.max_force == pytest.approx(150.0)
     assert winch.max_speed == pytest.approx(0.0617847, rel=1e-5)
     assert Winch(**winch.model_dump()) == winch
-
-
-@pytest.mark.parametrize(
-    ("given", "key", "word"),
-    [
-        ({"motor": "AX-12", "spool": "1 cm"}, "motor", "AX-12A"),
-        ({"spool": "1 cm"}, "motor", "expected one of"),
-        ({"motor": "AX-12A"}, "spool", "m"),
-        ({"motor": "AX-12A", "spool": "-1 cm"}, "spool", "above 0"),
-    ],
-)
-def test_a_wrong_motor_is_refused(given, key, word, refused):
-    with refused("Winch", key, word):
-        Winch(**given)
