@@ -40,11 +40,9 @@ from planning_page import (
 )
 from records import append
 from scipy.ndimage import map_coordinates
-from script import evolved, run_script
+from script import chosen, evolved, run_script
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError
-from tetra_drake.formatting import listed
 from tetra_drake.lab.planner import Planner
 from tetra_drake.lab.prototype.export import COMMAND, export
 from tetra_drake.lab.study.robustness import default_disturbances
@@ -373,9 +371,8 @@ def run_all(episodes: Sequence[Episode], folder: Path) -> None:
 def main(groups: Sequence[str], folder: Path = HERE) -> None:
     """Runs the episodes of groups, or all, films the slalom, and writes the page. Raises
     InputError."""
-    if unknown := {*groups} - {*GROUPS}:
-        raise InputError("GROUP", "", f"found {listed([*unknown])}, expected {listed(GROUPS)}")
-    run_all([each for each in all_episodes() if not groups or each.group in groups], folder)
+    groups = chosen(groups, GROUPS, "GROUP")
+    run_all([each for each in all_episodes() if each.group in groups], folder)
     if not (folder / FILM).exists():
         slalom, *_ = courses()
         film(run_episode(slalom)[1], EPISODES["courses"]["slalom"]["pillars"], folder / FILM)

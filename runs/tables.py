@@ -26,6 +26,7 @@ from PIL import Image
 from readings import RECORD, load_record
 from record import EXPERIMENTS, PICTURE
 from script import run_script
+from settle import settled
 from sine import TRIED, load_sines
 
 from tetra_drake.evolution.manifest import MANIFEST
@@ -50,6 +51,9 @@ HEIGHT = 96
 """Height of pictures in the gallery's table, in pixels."""
 
 ENGINES = ("compiled", "diagram", "MuJoCo")
+
+OTHERS = {"undulation": "undulation-four", "rough-feedback": "rough"}
+"""Runs with which others are compared on their pages."""
 
 FAR = 5.0
 """Distance (in) from which a gait walks; of less, a difference in percent says little."""
@@ -261,15 +265,18 @@ def pages(runs: Runs) -> list[Path]:
 def made_again(page: Path, runs: Runs) -> str:
     """Text of a page with new tables. Raises InputError if the page cannot be read."""
 
-    def make_table(name: str) -> str:
+    name = page.parent.name
+
+    def make_table(table: str) -> str:
         tables = {
             "results": lambda: results_table(runs),
             "gallery": lambda: gallery_table(runs),
             "trust": lambda: trust_table(runs),
-            "trials": lambda: trials_table(page.parent.name, runs),
-            "partings": lambda: partings_table(page.parent.name, "thesis"),
+            "trials": lambda: trials_table(name, runs),
+            "settled": lambda: settled(HERE / OTHERS[name], HERE / name).markdown(),
+            "partings": lambda: partings_table(name, "thesis"),
         }
-        return tables[name]()
+        return tables[table]()
 
     return filled(read_text(page, "page"), make_table)
 
