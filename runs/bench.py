@@ -10,11 +10,12 @@ interrupted script continues. Then the script writes the page README.md from the
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import hashlib
-import importlib.util
 import math
+import runpy
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -31,7 +32,7 @@ from script import read_settings, run_script
 
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError, SimulationFailure, check_type
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
@@ -207,27 +208,20 @@ class Entry:
         """The entry in a Python file: its function `solve`, its docstring, a list TASKS if it
         solves some tasks only, and CHANGES of their scenarios if it needs any. Raises InputError if
         it cannot be imported or has no `solve`."""
-        spec = importlib.util.spec_from_file_location(f"entry_{file.stem}", file)
-        if not file.is_file() or spec is None or spec.loader is None:
-            raise InputError(file, "", "is no Python file")
-        module = importlib.util.module_from_spec(spec)
         try:
-            spec.loader.exec_module(module)
+            content = runpy.run_path(str(file))
         except (Exception, SystemExit) as error:
-            problem = f"cannot be imported: {type(error).__name__}: {error}"
+            problem = f"cannot be run: {type(error).__name__}: {error}"
             raise InputError(file, "", problem) from error
-        solve = getattr(module, "solve", None)
-        if not callable(solve):
+        if not callable(solve := content.get("solve")):
             problem = f"found {solve!r:.60}, expected a function solve(problem, seed)"
             raise InputError(file, "solve", problem)
         names = [task.name for task in TASKS]
-        tasks = getattr(module, "TASKS", names)
-        check_type(file, "TASKS", tasks, list, tuple)
-        if unknown := set(map(str, tasks)) - set(names):
-            problem = f"found {sorted(unknown)[0]!r}, expected some of {', '.join(names)}"
+        tasks, changes = content.get("TASKS", names), content.get("CHANGES", {})
+        if not {*tasks} <= {*names}:
+            problem = f"found {tasks!r:.60}, expected some of {', '.join(names)}"
             raise InputError(file, "TASKS", problem)
-        about = (module.__doc__ or file.stem).strip().split("\n")[0].rstrip(".")
-        changes = getattr(module, "CHANGES", {})
+        about = (content["__doc__"] or file.stem).strip().split("\n")[0].rstrip(".")
         digest = hashlib.sha256(file.read_bytes()).hexdigest()[:12]
         is_shipped = file.resolve().parent == ENTRIES.resolve()
         if not is_shipped and (ENTRIES / file.name).exists():
@@ -276,14 +270,12 @@ def _checked(solution: Any, problem: Problem, entry: Entry) -> Solution:
     the space."""
     if callable(solution):
         return solution
-    expected = f"{len(problem.space.names)} numbers or a controller"
-    try:
+    with contextlib.suppress(TypeError, ValueError):
         vector = np.asarray(solution, dtype=float)
-    except (TypeError, ValueError):
-        vector = np.zeros(0)
-    if vector.shape != problem.space.low.shape or not np.isfinite(vector).all():
-        raise InputError(entry.name, "solve", f"returned {solution!r:.60}, expected {expected}")
-    return vector.round(DECIMALS)
+        if vector.shape == problem.space.low.shape and np.isfinite(vector).all():
+            return vector.round(DECIMALS)
+    expected = f"{len(problem.space.names)} numbers or a controller"
+    raise InputError(entry.name, "solve", f"returned {solution!r:.60}, expected {expected}")
 
 
 # The page
@@ -302,9 +294,8 @@ def shares(records: Sequence[Record]) -> dict[str, dict[str, np.ndarray]]:
     found: dict[str, dict[str, np.ndarray]] = {}
     by_place = scores(records)
     for (task, entry), values in by_place.items():
-        rivals = [v for (other, _), v in by_place.items() if other == task]
-        best = max(float(interquartile_mean(rival)) for rival in rivals)
-        found.setdefault(entry, {})[task] = values / best
+        means = [interquartile_mean(v) for (other, _), v in by_place.items() if other == task]
+        found.setdefault(entry, {})[task] = values / float(max(means))
     return found
 
 

@@ -281,9 +281,8 @@ def others() -> list[Episode]:
             own = {"plant": each["climb"], "planning": gait["planner"]}
             own["make_command"] = climbing_command
         most = each.get("most", 60.0)
-        episodes.append(
-            Episode("others", each["name"], task, each["base"], changes, most=most, **own)
-        )
+        named = partial(Episode, "others", each["name"], task, each["base"], changes)
+        episodes.append(named(most=most, **own))
     return episodes
 
 
@@ -322,12 +321,8 @@ def run_episode(episode: Episode) -> tuple[Record, SimulationResult]:
     with contextlib.suppress(Over):
         simulate(longer, controller=act, control_period=period)
     short = scenario.with_changes({"simulation.duration": f"{period * len(actions):.6g} s"})
-    result = simulate(
-        short,
-        controller=lambda now, _: actions[round(now / period)],
-        control_period=period,
-        record=True,
-    )
+    again = partial(simulate, short, control_period=period, record=True)
+    result = again(controller=lambda now, _: actions[round(now / period)])
     record = recorded(episode, result) | task.found(result.trajectory.p_WN.values)
     record |= {"is_done": is_done, "cpu": cpu, "wall": planner.wall_times, "load": load}
     record |= {key: np.round(record[key], 3).tolist() for key in ("cpu", "wall", "load")}
