@@ -11,7 +11,7 @@ from helpers import joined
 from helpers.anchored import BAR, HUNG, floating_prism, scenario_of, supported_prism
 
 from tetra_drake.kernels.packed import Packed
-from tetra_drake.lab.study.equilibrium import robot_of_file
+from tetra_drake.lab.study.equilibrium import robot_of_file, study_equilibrium
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.capsules import find_touch
 from tetra_drake.laws.forces import Forces, compute_state_forces
@@ -209,7 +209,7 @@ def test_a_structure_file_may_have_struts_that_overlap(tmp_path):
 def test_struts_of_a_structure_file_whose_axes_meet_pass_through_each_other(tmp_path):
     file = tmp_path / "crossed.yaml"
     file.write_text(CROSSED.replace("HEIGHT", "1e-16"))
-    robot = robot_of_file(str(file))
+    robot = study_equilibrium(file).robot
     assert not robot.model.strut_contact.acts
     assert list(overlaps(robot.scenario, robot.structure, robot.equilibrium.state)) == [
         ("a b", "c d")

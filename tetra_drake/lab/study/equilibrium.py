@@ -137,12 +137,18 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         >>> tensions, heights = study.cables.tension, study.nodes.z
 
     Args:
-        given: a scenario, its name or file, or a run; or a robot.
+        given: a scenario, its name or file, or a run; a structure file (see robot_of_structure());
+            or a robot.
 
     Raises:
         InputError: if the robot has no equilibrium.
     """
-    robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
+    if isinstance(given, Robot):
+        robot = given
+    elif isinstance(given, (str, Path)) and os.path.isfile(given) and not names_scenario(given):
+        robot = robot_of_file(str(given))
+    else:
+        robot = Robot.of(given_scenario(given))
     structure, equilibrium = robot.structure, robot.equilibrium
     unactuated, p_WN = Unactuated(robot.model), node_positions(structure, equilibrium.state)
     force_at_rest(unactuated, equilibrium.state)
