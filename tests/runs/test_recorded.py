@@ -108,6 +108,7 @@ def test_a_run_begins_as_its_scenario_and_seed_say(name):
     folder = tables.HERE / name
     manifest = read_manifest(folder)
     scenario, seeds = manifest.scenario, np.random.SeedSequence(manifest.seed)
+    assert not record.EXPERIMENTS[name].scenario(name).differences(scenario)
     seed = seeds.spawn(scenario.evolution.trials)[0]
     space, generator = ParameterSpace.of(scenario), np.random.default_rng(seed)
     asked = optimizer_of(scenario.optimizer)(space, scenario.evolution, generator).ask()
