@@ -268,17 +268,6 @@ def turned_back(q: np.ndarray, p_W: np.ndarray) -> np.ndarray:
     return rotated(q * [1.0, -1.0, -1.0, -1.0], p_W)
 
 
-def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:
-    """Rates (times, cables) of the cables' lengths in m/s, from positions and velocities of the
-    nodes (times, nodes, 3) in m and m/s."""
-    ends = structure.segments.ends
-    p_AB, v_AB = (x[:, ends[:, 1]] - x[:, ends[:, 0]] for x in (p_WN, v_WN))
-    rates = np.zeros((len(structure.cable_names), len(p_WN)))
-    of_pieces = (p_AB * v_AB).sum(axis=2) / np.linalg.norm(p_AB, axis=2)
-    np.add.at(rates, structure.segments.cable, of_pieces.T)
-    return rates.T
-
-
 def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
     """Adds the bodies of a structure, as free bodies, to a plant that is not finalized, and returns
     them in the structure's order. If the plant has a SceneGraph, struts and spheres are shown."""

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
+from tetra_drake.lab.bridges.formats import names_scenario
 from tetra_drake.lab.study.statics import Statics, find_statics
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.cable import TENSION
@@ -46,7 +47,7 @@ from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenar
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
-from tetra_drake.scenario.structure_files import names_scenario, read_structure
+from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.settings.refusals import no_such
 from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
 
