@@ -65,8 +65,8 @@ class CableNetwork(ConvertibleSystem):
     actuators has states.
 
     `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
-    loop. Where the model is `slack`, a cable goes slack instead of pushing. The pull of a cable whose
-    ends meet is 0; see laws.cable.MEETING.
+    loop. Where the model is `slack`, a cable goes slack instead of pushing. A cable whose ends meet
+    does not pull; see laws.cable.MEETING.
 
     With `parameters`, the constants of the cables are parameters of the context (4*cables,): each
     number of laws.cable.CableLaw for all cables, one after the other, then the rows of their
