@@ -18,7 +18,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 import tetra_drake as td
 from helpers.actuations import WINCH
-from helpers.anchored import HUNG, SWINGING, scenario_of
+from helpers.anchored import HUNG, SWINGING, TREES, scenario_of
 from helpers.brief import BRIEF
 from helpers.controllers import OwnGround, Springs
 from helpers.converged import shortly
@@ -35,6 +35,7 @@ from tetra_drake.lab.linearization.linearization import linearize
 from tetra_drake.lab.planner import Planner
 from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.lab.study.sweep import sweep
+from tetra_drake.laws.actuator import Winch
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.contact import MODE_COLUMNS, GroundSection, NormalForce
 from tetra_drake.laws.friction import Coulomb
@@ -90,6 +91,10 @@ def prism():
 @functools.cache
 def hung(**changes):
     return scenario_of(HUNG | changes)
+
+
+def started(name: str, **start: Any):
+    return Robot.of(scenario_of(TREES[name] | {"start": {"rest": False} | start}))
 
 
 def tolerant():

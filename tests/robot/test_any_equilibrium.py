@@ -160,15 +160,13 @@ def test_stiffness_is_how_forces_change(scenario):
         assert found == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize(
-    ("c", "d", "pushed"),
-    [
-        ([0.01, -0.1, 0.106], [0.02, 0.1, 0.107], True),  # the second lies across the first
-        ([0.01, 0.003, 0.104], [0.05, 0.1, 0.13], True),  # it ends there
-        ([0.103, 0.003, 0.104], [0.2, 0.1, 0.13], True),  # both do
-        ([0.0, -0.1, 0.1], [0.0, 0.1, 0.1], False),  # their axes meet
-    ],
-)
+TOUCHES = [([0.01, -0.1, 0.106], [0.02, 0.1, 0.107], True)]  # the second lies across the first
+TOUCHES += [([0.01, 0.003, 0.104], [0.05, 0.1, 0.13], True)]  # it ends there
+TOUCHES += [([0.103, 0.003, 0.104], [0.2, 0.1, 0.13], True)]  # both do
+TOUCHES += [([0.0, -0.1, 0.1], [0.0, 0.1, 0.1], False)]  # their axes meet
+
+
+@pytest.mark.parametrize(("c", "d", "pushed"), TOUCHES)
 def test_stiffness_is_how_forces_change_where_struts_touch(c, d, pushed):
     tree = {
         "nodes": {"a": [-0.1, 0.0, 0.1], "b": [0.1, 0.0, 0.1], "c": c, "d": d},

@@ -217,8 +217,8 @@ def gait_label(row: pandas.Series) -> str:
 
 
 def load_run(path: str | Path) -> Run:
-    """Loads a run directory, finished or not, as pandas tables. `evaluations` has those of an
-    iteration under way, too.
+    """Loads a run directory, finished or not, as pandas tables. `evaluations` includes an
+    iteration under way.
 
         >>> run = td.load_run("runs/demo")
         >>> result = td.simulate(run.scenario, run.best_gait())
@@ -252,7 +252,8 @@ def _table(directory: Path, manifest: Manifest, *names: str) -> pandas.DataFrame
     import pandas
 
     kind, parameters = LINES[names[0]], _parameters(manifest.scenario)
-    blueprint, rows = manifest.scenario.robot.blueprint(), []
+    blueprint = manifest.scenario.robot.blueprint()
+    rows: list[dict[str, Any]] = []
     for trial, name in itertools.product(range(manifest.scenario.evolution.trials), names):
         file = RecordFile.of(directory, manifest.run, name, trial=trial)
         known = {row["index"] for row in rows if row["trial"] == trial} if name != names[0] else ()

@@ -37,7 +37,6 @@ from tetra_drake.systems.attachment import (
     check_part,
     numbers_for_each,
 )
-from tetra_drake.systems.cable_geometry import CableGeometry_, RegisterCylinders
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 _LEAST_LENGTH = 1e-9
@@ -311,18 +310,9 @@ def AddCables(
         builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
         builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
     if scene_graph is not None and names:
-        named = zip(names, pieces, strict=True)
-        of_pieces = {
-            one if len(each) == 1 else f"{one} {number}": length
-            for one, each in named
-            for number, length in enumerate(each, 1)
-        }
-        source = scene_graph.RegisterSource(name)
-        cylinders = RegisterCylinders(scene_graph, source, lengths=of_pieces)
-        shown = builder.AddNamedSystem(f"{name}_geometry", CableGeometry_[float](cylinders))
-        builder.Connect(network.GetOutputPort("ends"), shown.get_input_port())
-        poses = scene_graph.get_source_pose_port(source)
-        builder.Connect(shown.get_output_port(), poses)
+        from tetra_drake.systems.cable_geometry import AddCableGeometry
+
+        AddCableGeometry(builder, scene_graph, network, dict(zip(names, pieces, strict=True)))
     return network
 
 
