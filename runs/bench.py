@@ -25,6 +25,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import pandas
 from matplotlib.figure import Figure
 from page import rendered
 from records import append, read
@@ -55,7 +56,7 @@ from tetra_drake.scenario.scenario import Scenario
 
 HERE = Path(__file__).parent / "bench"
 ENTRIES, FILE = HERE / "entries", HERE / "tasks.yaml"
-RECORDS, PAGE_NAME, FIGURE = "records.jsonl", "README.md", "scores"
+RECORDS, INTERVALS, PAGE_NAME, FIGURE = "records.jsonl", "scores.csv", "README.md", "scores"
 SEEDS, EPISODES = 10, 250
 """Number of solutions of each entry to each task, and the budget of one in episodes."""
 DECIMALS = 6
@@ -358,6 +359,14 @@ def numbers(records: Sequence[Record]) -> dict[str, Any]:
     return {"entries": entries, "means": means, "highest": highest, "best": best}
 
 
+def intervals(records: Sequence[Record]) -> str:
+    """Interquartile means with their 95 % intervals as CSV."""
+    means = numbers(records)["means"]
+    rows = [[task, name, *each] for task, own in means.items() for name, each in own.items()]
+    columns = ["task", "entry", "mean", "low", "high"]
+    return str(pandas.DataFrame(rows, columns=columns).to_csv(index=False, float_format="%.6g"))
+
+
 def page(records: Sequence[Record]) -> str:
     """Text of the page, from the records."""
     settings = {"tasks": TASKS, "episodes": EPISODES, "seeds": SEEDS, "least": LEAST_SPEED}
@@ -384,6 +393,7 @@ def main(files: Sequence[str]) -> None:
             print(f"{task.name}, {entry.name}: {mean:.3g} {task.unit}", flush=True)
     records = read(HERE / RECORDS)
     save_figure(scores_figure(records), HERE, FIGURE, kinds=["svg"])
+    write_whole(HERE / INTERVALS, intervals(records))
     write_whole(HERE / PAGE_NAME, page(records))
 
 

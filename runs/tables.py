@@ -4,8 +4,8 @@
 
 Each table is in a Markdown file between two lines:
 
-    <!-- table NAME: runs/tables.py -->
-    <!-- end -->
+    <!--tables.py:NAME-->
+    <!--end-->
 """
 
 from __future__ import annotations
@@ -58,9 +58,7 @@ OTHERS = {"undulation": "undulation-four", "rough-feedback": "rough"}
 FAR = 5.0
 """Distance (in) from which a gait walks; of less, a difference in percent says little."""
 
-_TABLE = re.compile(
-    r"(?P<begin><!-- table (?P<name>\S+): runs/tables.py -->)\n.*?<!-- end -->", re.DOTALL
-)
+_TABLE = re.compile(r"(?P<begin><!--tables.py:(?P<name>\S+)-->)\n.*?<!--end-->", re.DOTALL)
 
 
 Runs = Mapping[str, Analysis]
@@ -264,12 +262,12 @@ def filled(text: str, make_table: Callable[[str], str]) -> str:
     """
 
     def remade(match: re.Match[str]) -> str:
-        if match[0].count("<!-- table ") > 1:
+        if match[0].count("<!--tables.py:") > 1:
             raise ValueError(f"table {match['name']} has no end before the next one")
-        return f"{match['begin']}\n\n{make_table(match['name']).rstrip()}\n\n<!-- end -->"
+        return f"{match['begin']}\n\n{make_table(match['name']).rstrip()}\n\n<!--end-->"
 
     text, tables = _TABLE.subn(remade, text)
-    if tables < text.count("<!-- table "):
+    if tables < text.count("<!--tables.py:"):
         raise ValueError("the last table has no end")
     return text
 

@@ -148,14 +148,6 @@ def test_the_last_period_ends_with_the_simulation(short):
     assert times[-2:] == [0.24, 0.25] and simulation.ended.all()
 
 
-def test_the_digits_of_a_robot_depend_neither_on_others_nor_on_threads(short):
-    scenario = short.with_changes(WINCH)
-    one, alone = (Simulation(scenario, count=9, workers=workers) for workers in (1, 9))
-    actions = drawn_actions(one)
-    for ours, theirs in zip(go(one, actions), go(alone, actions), strict=True):
-        assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
-
-
 def test_after_an_interrupt_a_reset_makes_the_robots_whole(short, monkeypatch, refused):
     two = Simulation(short.with_changes({"robot.tetrahedra": 2}), count=2, workers=1)
     actions, call = drawn_actions(two)[:3], LaneThread.simulate

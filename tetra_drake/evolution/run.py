@@ -217,8 +217,8 @@ def gait_label(row: pandas.Series) -> str:
 
 
 def load_run(path: str | Path) -> Run:
-    """Loads a run directory, finished or not, as pandas tables, with the evaluations
-    of an iteration under way.
+    """Loads a run directory, finished or not, as pandas tables. `evaluations` includes an
+    iteration under way.
 
         >>> run = td.load_run("runs/demo")
         >>> result = td.simulate(run.scenario, run.best_gait())
