@@ -39,9 +39,9 @@ from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.formatting import TextTable, fixed
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, controlled_robot

@@ -13,8 +13,8 @@ from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.lab.bridges.conversion import converted
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.laws.terrain import Flat, Incline
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot

@@ -145,7 +145,7 @@ def find_equilibrium(
         found = f"finds no equilibrium in {count} steps; {left[body]:.3g} N are left"
         reason = "it still moves; give positions nearer to an equilibrium, or more tension"
         if not np.isfinite(left[body]):
-            reason = "its position is not finite, or two ends of a cable meet"
+            reason = "its position is not finite"
         raise InputError(source, "robot", f"{found} on '{bodies[body]}': {reason}")
     force_at_rest(robot, descent.state)
     lengths = np.round(robot.forces.cable_forces[:, cable.LENGTH], LENGTH_DIGITS)

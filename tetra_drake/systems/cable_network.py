@@ -39,9 +39,6 @@ from tetra_drake.systems.attachment import (
 )
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
-_LEAST_LENGTH = 1e-9
-"""Least length (m) of a cable at the start. The direction of a shorter one is not known."""
-
 
 class CableNetwork(ConvertibleSystem):
     """Cables between bodies (thesis Eq. 6), also over rings. The system has no state.
@@ -68,7 +65,7 @@ class CableNetwork(ConvertibleSystem):
 
     `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
     loop. Where the model is `slack`, a cable goes slack instead of pushing. A cable whose ends meet
-    has no direction: the outputs raise SimulationFailure.
+    does not pull; see laws.cable.MEETING.
 
     With `parameters`, the constants of the cables are parameters of the context (4*cables,): each
     number of laws.cable.CableLaw for all cables, one after the other, then the rows of their
@@ -172,7 +169,7 @@ class CableNetwork(ConvertibleSystem):
         if math.isfinite(total) or not np.isfinite(state).all():
             return table
         place = int(np.argmin(np.isfinite(table).all(axis=1)))
-        reason = f"the ends of cable '{self._names[place]}' meet, or its forces are too large"
+        reason = f"the forces of cable '{self._names[place]}' are too large"
         raise SimulationFailure(time=context.get_time(), reason=reason)
 
     def _warn(self, table: np.ndarray) -> None:
@@ -371,7 +368,7 @@ def _default_lengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> list[lis
         offsets = [end.CalcPose(context, start).translation() for start, end in pieces]
         of_pieces: list[float] = np.linalg.norm(offsets, axis=1).tolist()
         lengths.append(of_pieces)
-        if not all(_LEAST_LENGTH <= length < math.inf for length in of_pieces):
+        if not all(cable.MEETING <= length < math.inf for length in of_pieces):
             problem = f"found a length of {min(of_pieces):.3g} m at the plant's default positions"
             raise InputError("AddCables", f"cables.{one.name}", f"{problem}, expected more")
     return lengths
