@@ -300,13 +300,6 @@ def test_forces_do_not_depend_on_when_near_struts_were_searched():
     np.testing.assert_array_equal(forces, anew)
 
 
-def test_struts_that_overlap_at_the_start_are_named(refused):
-    scenario = loose_bars(ACROSS, dissipation=1.0).scenario
-    offsets = [["0 m", "0 m", "1 m"], ["0 m", "0 m", "0.9875 m"]]  # 0.5 mm too near
-    with refused("prism", "strut_contact", "a0 b0", "a1 b1", "0.5 mm"):
-        Robot.of(scenario.with_changes({"robot.offsets": offsets}))
-
-
 def test_the_spin_of_a_bar_about_its_axis_hardly_shortens_steps():
     # It exerts no torque. It turns with the axis, so it does add to the error of a long step.
     times = {"simulation.duration": "2 s", "simulation.steady_from": "1 s", "cpg.start_up": "0.5 s"}
