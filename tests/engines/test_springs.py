@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.anchored import scenario_of
+from helpers.anchored import TREES, scenario_of
 from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.simulate import simulate
@@ -38,18 +38,13 @@ def pull(name: str, x: float) -> float:
 
 def hung(engine: str) -> Scenario:
     """A mass on each spring, 20 mm above the end of the loose spring."""
-    groups = {
-        name: {"pairs": [[f"h-{name}", f"m-{name}"]], "damping": 0.0, "free_length": FREE} | own
-        for name, own in SPRINGS.items()
-    }
-    nodes = {f"h-{name}": [0.2 * i, 0.0, 1.0] for i, name in enumerate(SPRINGS)}
-    nodes |= {f"m-{name}": [0.2 * i, 0.0, 0.9] for i, name in enumerate(SPRINGS)}
-    tree = {
-        "nodes": nodes,
-        "cables": groups,
-        "anchors": dict.fromkeys([f"h-{name}" for name in SPRINGS], "xyz"),
-        "masses": dict.fromkeys([f"m-{name}" for name in SPRINGS], MASS),
-    }
+    loose = {"damping": 0.0, "free_length": FREE}
+    ends = {name: (f"h-{name}", f"m-{name}") for name in SPRINGS}
+    tree = {"nodes": {}, "cables": {}, "anchors": {}, "masses": {}}
+    for i, (name, (hook, mass)) in enumerate(ends.items()):
+        tree["nodes"] |= {hook: [0.2 * i, 0.0, 1.0], mass: [0.2 * i, 0.0, 0.9]}
+        tree["cables"][name] = loose | SPRINGS[name] | {"pairs": [[hook, mass]]}
+        tree["anchors"][hook], tree["masses"][mass] = "xyz", MASS
     changes = {"simulation.sample_period": "5 ms", "friction.stiffness": "0 N/m"}
     resting = scenario_of(tree, duration=0.3, engine=engine, **changes)
     lengths = Robot.of(resting).structure.initial_lengths
@@ -111,14 +106,7 @@ def test_energy_and_stretch_of_a_spring_fit_its_tension(name):
 
 
 def test_a_string_without_stiffness_gets_that_of_anchors():
-    tree = StructureFile.model_validate(
-        {
-            "nodes": {"h": [0.0, 0.0, 1.0], "m": [0.1, 0.0, 0.6]},
-            "cables": {"line": {"pairs": [["h", "m"]], "string": True, "free_length": 0.4}},
-            "anchors": {"h": "xyz"},
-            "masses": {"m": 2.0},
-        }
-    )
+    tree = StructureFile.model_validate(TREES["strung"])
     law = tree.blueprint().cable_laws[0]
     assert law["stiffness"] == pytest.approx(2.0 * G / (1e-5 * 0.4))  # sags by 1e-5 of its length
     assert law["damping"] == 1e-3 * law["stiffness"]
