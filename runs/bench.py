@@ -234,6 +234,7 @@ class Entry:
             raise InputError(file, "TASKS", problem)
         about = (module.__doc__ or file.stem).strip().split("\n")[0].rstrip(".")
         changes = getattr(module, "CHANGES", {})
+        check_type(file, "CHANGES", changes, Mapping)
         digest = hashlib.sha256(file.read_bytes()).hexdigest()[:12]
         is_shipped = file.resolve().parent == ENTRIES.resolve()
         if not is_shipped and (ENTRIES / file.name).exists():
