@@ -83,8 +83,8 @@ def _check_name(name: object) -> object:
     refused: they separate the parts of cable names, the parts of keys, and keys."""
     if not isinstance(name, str):
         refuse("", f"found the name {name}, expected a text, such as n{name}")
-    if re.search(r"[\s.,\[\]]", name) or not name.isprintable():
-        refuse("", f"found the name '{name}', expected one without blanks, dots, commas, brackets")
+    if not name or re.search(r"[\s.,\[\]]", name) or not name.isprintable():
+        refuse("", f"found the name '{name}', expected some without blanks, dots, commas, brackets")
     return name
 
 
