@@ -221,6 +221,33 @@ def played(rng, folder):
     env.step(rng.choice([env.action_space.sample(), *ODD]))
 
 
+SPRINGS = yaml.safe_load(
+    """
+coil: {pairs: [[n0, n1]], stiffness: 60 N/m, damping: 1 N*s/m, free_length: 0.1 m,
+  initial_tension: 1 N, quadratic: 9 N/m^2, cubic: 1 N/m^3, max_stretch: 0.1 m,
+  factors: {damping: [2]}}
+table: {pairs: [[n1, n4, n2]], damping: 1 N*s/m, tension: 1 N, mu: 0.3, max_tension: 9 N,
+  curve: {stretch: [0.1 m, 0.2 m], force: [1 N, 2 N]}}
+string: {pairs: [[n2, n3, n0]], string: true, free_length: 0.3 m, mu: 0.1}
+"""
+)
+ERRORS = {name: {"lengths": "1 mm", "q_WB": "1 deg"} for name in ("noise", "bias", "resolution")}
+ERRORS |= {"delay": {"rates": "100 ms", "tensions": "0 s"}, "seed": 3}
+
+
+def sprung(rng, folder):
+    cables = TREE["cables"] | mutated(rng, SPRINGS)
+    text = yaml.dump(TREE | {"cables": cables})
+    (folder / "a.yaml").write_text(text, "utf-8")
+    file = garbled(rng, folder, ".yaml", text) if rng.random() < 0.3 else folder / "a.yaml"
+    return Robot.of(PRISM.with_sections(robot=read_structure(file))).equilibrium
+
+
+def sensed(rng, folder):
+    scenario = PRISM.with_file({"sensing": mutated(rng, ERRORS)}, "a")
+    return td.Simulation(scenario, count=1).step(np.zeros((1, 6)))
+
+
 SPREAD = {"disturbances": {"draws": 2, "spreads": {"ground.stiffness": 0.1}}}
 WAVES = "gain: 2 N, frequency: [0.3 Hz, 1 Hz], coupling: [0, 5 1/s], start_up: 0 s, common: [lag]"
 
@@ -275,6 +302,8 @@ SURFACES = {
     "bench": entered,
     "Simulation": stepped,
     "gym": played,
+    "springs": sprung,
+    "sensing": sensed,
 }
 
 

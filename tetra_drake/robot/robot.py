@@ -111,8 +111,9 @@ class Robot:
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
-                law = laws[number].items()
-                laws[number] = {k: x.scaled(0.0) if k == "curve" else 0.0 for k, x in law}
+                own = cable.CableLaw(**laws[number])
+                kept = {"free_length": 0.0, "intact": own.intact}
+                laws[number] = own.cut()._replace(**kept)._asdict()
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),

@@ -307,6 +307,8 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     remarks = [sinking_remark(robot), yielding_remark(robot)]
     remarks.append(overload_remark(robot, study.cables["tension"].to_numpy()))
     lines = ["Its `start` is not at rest."] if structure.start else []
+    if structure.rubbing:
+        lines.append("Friction at rings and in joints is left out: it holds robots near this pose.")
     lines += [sentence(told) for told in remarks if told]
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
