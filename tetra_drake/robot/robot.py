@@ -70,7 +70,7 @@ class Robot:
                 terrain or with struts that overlap, or its start moves what is held.
         """
         scenario = scenario.with_sections(events=[]) if at_rest else scenario
-        placed = structure = _placed(scenario)
+        placed = structure = Structure.of(scenario.blueprint())
         check_apart(scenario, placed, may_overlap=at_rest)
         model = make_model(scenario.with_sections(terrain=Flat()), placed)
         start = None if at_rest else placed.start
@@ -161,7 +161,7 @@ class Robot:
             return self.before.equilibrium
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
-        placed = _placed(self.scenario)
+        placed = Structure.of(self.scenario.blueprint())
         if placed.settles:
             return Robot.of(self.scenario, at_rest=True).equilibrium
         return equilibrium_of(self.scenario, placed)
@@ -340,12 +340,6 @@ class Phase:
         from tetra_drake.robot.start import pushed
 
         return pushed(states, self.robot.structure, self.push)
-
-
-def _placed(scenario: World) -> Structure:
-    """The structure of a scenario's robot at the positions of its settings, before any search for
-    equilibrium. It has no contact nodes if the scenario has no ground."""
-    return Structure.of(scenario.blueprint())
 
 
 def equilibrium_of(
