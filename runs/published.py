@@ -27,7 +27,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.lab.bridges.conversion import converted
-from tetra_drake.scenario.structure_files import save_structure
+from tetra_drake.lab.bridges.formats import save_structure
 
 OUT = Path(__file__).parent / "published"
 TIMES = np.linspace(0.0, 4.0, 401)
@@ -57,8 +57,7 @@ def by_mujoco(
     file: Path, start: Any, *, step: float, pull_only: bool, stiffer: float = 1.0
 ) -> Motion:
     """Motion that MuJoCo computes. With `pull_only`, tendons neither push nor damp while slack.
-    `stiffer`
-    multiplies the stiffness of contacts; their damping ratio stays."""
+    `stiffer` multiplies the stiffness of contacts; their damping ratio stays."""
     model = mujoco.MjModel.from_xml_path(str(file))
     model.opt.timestep = step
     model.geom_solref *= [stiffer, np.sqrt(stiffer)]

@@ -65,16 +65,11 @@ def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scena
     assert there[-1]["signals"].any()
 
 
-@pytest.mark.parametrize(
-    ("tetrahedra", "damping", "scheme"),
-    [
-        (5, 0.05, "radau3"),
-        (24, 0.05, "radau3"),
-        (48, 0.05, "runge_kutta3"),
-        (48, 0.5, "radau3"),
-        (13, 0.0, "runge_kutta3"),
-    ],
-)
+SCHEMES = [(5, 0.05, "radau3"), (24, 0.05, "radau3"), (48, 0.05, "runge_kutta3")]
+SCHEMES += [(48, 0.5, "radau3"), (13, 0.0, "runge_kutta3")]
+
+
+@pytest.mark.parametrize(("tetrahedra", "damping", "scheme"), SCHEMES)
 def test_large_robots_are_integrated_explicitly_unless_dampers_are_fast(
     scenario, tetrahedra, damping, scheme
 ):

@@ -18,7 +18,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 import tetra_drake as td
 from helpers.actuations import WINCH
-from helpers.anchored import HUNG, SWINGING, scenario_of
+from helpers.anchored import HUNG, SWINGING, TREES, scenario_of
 from helpers.brief import BRIEF
 from helpers.controllers import OwnGround, Springs
 from helpers.converged import shortly
@@ -26,15 +26,16 @@ from helpers.made_up_walk import make_walk
 from helpers.rod import LAW, rod_with_tendons
 from tetra_drake.engines.drake import MakeDisturbedSimulator
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.figures.style import Look
 from tetra_drake.gym import TensegrityEnv, TensegrityVectorEnv
 from tetra_drake.lab.fit.fit import fit
 from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.lab.linearization.linearization import linearize
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.lab.study.sweep import sweep
+from tetra_drake.laws.actuator import Winch
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.contact import MODE_COLUMNS, GroundSection, NormalForce
 from tetra_drake.laws.friction import Coulomb
@@ -90,6 +91,10 @@ def prism():
 @functools.cache
 def hung(**changes):
     return scenario_of(HUNG | changes)
+
+
+def started(name: str, **start: Any):
+    return Robot.of(scenario_of(TREES[name] | {"start": {"rest": False} | start}))
 
 
 def tolerant():

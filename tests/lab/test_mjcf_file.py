@@ -17,12 +17,13 @@ from pytest import approx
 from tetra_drake.cli import main
 from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.lab.bridges.conversion import converted
+from tetra_drake.lab.bridges.formats import save_structure
 from tetra_drake.lab.study.equilibrium import robot_of_file, robot_of_structure
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import shipped_structures
-from tetra_drake.scenario.structure_files import read_structure, save_structure
+from tetra_drake.scenario.structure_files import read_structure
 
 mujoco = pytest.importorskip("mujoco")
 

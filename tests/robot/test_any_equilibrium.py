@@ -12,7 +12,7 @@ from helpers.anchored import BAR, HUNG, floating_prism, scenario_of, supported_p
 
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.lab.study.equilibrium import robot_of_file, study_equilibrium
-from tetra_drake.laws.cable import TENSION
+from tetra_drake.laws.cable import MEETING, TENSION
 from tetra_drake.laws.capsules import find_touch
 from tetra_drake.laws.forces import Forces, compute_state_forces
 from tetra_drake.laws.terrain import Flat
@@ -160,15 +160,25 @@ def test_stiffness_is_how_forces_change(scenario):
         assert found == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize(
-    ("c", "d", "pushed"),
-    [
-        ([0.01, -0.1, 0.106], [0.02, 0.1, 0.107], True),  # the second lies across the first
-        ([0.01, 0.003, 0.104], [0.05, 0.1, 0.13], True),  # it ends there
-        ([0.103, 0.003, 0.104], [0.2, 0.1, 0.13], True),  # both do
-        ([0.0, -0.1, 0.1], [0.0, 0.1, 0.1], False),  # their axes meet
-    ],
-)
+@pytest.mark.parametrize("scenario", [floating_prism(), joined.with_arm()], ids=attrgetter("name"))
+def test_stiffness_is_how_forces_change_where_the_ends_of_a_piece_meet(scenario):
+    robot = Robot.of(scenario)
+    structure, state = robot.structure, robot.equilibrium.state.copy()
+    a, b = structure.segments.ends[-1]  # of the arm, a piece of a path
+    moved, p_WN = structure.carriers[b], node_positions(structure, state)
+    place = 7 * moved + 4
+    state[place : place + 3] += p_WN[a] - p_WN[b] + 0.3 * MEETING
+    for motion, found, expected in changes(Unactuated(robot.model), state, 1e-9):
+        assert found @ motion == pytest.approx(expected @ motion, rel=1e-6)
+
+
+TOUCHES = [([0.01, -0.1, 0.106], [0.02, 0.1, 0.107], True)]  # the second lies across the first
+TOUCHES += [([0.01, 0.003, 0.104], [0.05, 0.1, 0.13], True)]  # it ends there
+TOUCHES += [([0.103, 0.003, 0.104], [0.2, 0.1, 0.13], True)]  # both do
+TOUCHES += [([0.0, -0.1, 0.1], [0.0, 0.1, 0.1], False)]  # their axes meet
+
+
+@pytest.mark.parametrize(("c", "d", "pushed"), TOUCHES)
 def test_stiffness_is_how_forces_change_where_struts_touch(c, d, pushed):
     tree = {
         "nodes": {"a": [-0.1, 0.0, 0.1], "b": [0.1, 0.0, 0.1], "c": c, "d": d},

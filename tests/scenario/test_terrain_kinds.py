@@ -198,14 +198,12 @@ def test_a_saved_field_does_not_need_the_file_it_was_read_from(tmp_path, damage,
         load_scenario(moved / SCENARIO)
 
 
-@pytest.mark.parametrize(
-    ("grid", "fact"),
-    [
-        (Grid(np.full((3, 3), np.nan), (-1.0, -1.0), (1.0, 1.0)), "nan in row 1"),
-        (Grid(np.zeros(9), (-1.0, -1.0), (1.0, 1.0)), "9 heights"),
-        (Grid(np.zeros((3, 3)), (-1.0, -1.0), (0.0, 1.0)), "cells of (0.0, 1.0) m"),
-    ],
-)
+GRIDS = [(Grid(np.full((3, 3), np.nan), (-1.0, -1.0), (1.0, 1.0)), "nan in row 1")]
+GRIDS += [(Grid(np.zeros(9), (-1.0, -1.0), (1.0, 1.0)), "9 heights")]
+GRIDS += [(Grid(np.zeros((3, 3)), (-1.0, -1.0), (0.0, 1.0)), "cells of (0.0, 1.0) m")]
+
+
+@pytest.mark.parametrize(("grid", "fact"), GRIDS)
 def test_the_grid_of_a_kind_is_held_to_what_a_height_file_is(grid, fact, refused):
     class Odd(Relief):
         def grid(self, **_: Any) -> Grid:

@@ -19,10 +19,10 @@ from tetra_drake.robot.command import (
     driven_robot,
     robot_of_controller,
 )
+from tetra_drake.robot.gait import SteeringSignal, constant_steering
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.steering import SteeringSignal, constant_steering
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 
