@@ -47,7 +47,7 @@ from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.struts import axial_forces
+from tetra_drake.robot.settling import axial_forces
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario, scenario_of
 

@@ -57,8 +57,7 @@ def by_mujoco(
     file: Path, start: Any, *, step: float, pull_only: bool, stiffer: float = 1.0
 ) -> Motion:
     """Motion that MuJoCo computes. With `pull_only`, tendons neither push nor damp while slack.
-    `stiffer`
-    multiplies the stiffness of contacts; their damping ratio stays."""
+    `stiffer` multiplies the stiffness of contacts; their damping ratio stays."""
     model = mujoco.MjModel.from_xml_path(str(file))
     model.opt.timestep = step
     model.geom_solref *= [stiffer, np.sqrt(stiffer)]

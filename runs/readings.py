@@ -17,12 +17,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pandas
-from script import evolved, read_record, read_settings, run_script
+from script import chosen, evolved, read_record, read_settings, run_script
 
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import check_file, write_whole
-from tetra_drake.formatting import listed, ranged
+from tetra_drake.formatting import ranged
 from tetra_drake.lab.study.statistics import interval_of_resamples, resampled
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
@@ -179,11 +178,9 @@ def off_by(trials: pandas.DataFrame) -> str:
 
 def main(names: Sequence[str]) -> None:
     """Records the readings of these names, or all. Raises InputError."""
-    if unknown := {*names} - {*ALL}:
-        problem = f"found {listed(sorted(unknown))}, expected {listed([*ALL])}"
-        raise InputError("NAME", "", problem)
+    names = chosen(names, ALL)
     check_file(RECORD)
-    for name in names or ALL:
+    for name in names:
         record = load_record(RECORD) if RECORD.exists() else {}
         if name not in record:
             made = record | {name: numbers(name)}

@@ -7,6 +7,7 @@ import contextlib
 import copy
 import functools
 import io
+import json
 import math
 import os
 import random
@@ -143,7 +144,23 @@ def commanded(rng, folder):
 
 
 SPREAD = {"disturbances": {"draws": 2, "spreads": {"ground.stiffness": 0.1}}}
+WAVES = "gain: 2 N, frequency: [0.3 Hz, 1 Hz], coupling: [0, 5 1/s], start_up: 0 s, common: [lag]"
+
+
+def waving(rng, folder):
+    tree = mutated(rng, yaml.safe_load(f"{{{WAVES}, feedback: [length], lag: [-90 deg, 1 rad]}}"))
+    waves = PRISM.with_changes({"cpg": "!Phase " + yaml.safe_dump(tree, default_flow_style=True)})
+    td.simulate(waves, td.seeded_gait(waves, 1))
+
+
+def read(rng, folder):
+    (file := folder / "gait.json").write_text(json.dumps(mutated(rng, made()[5].to_json(PRISM))))
+    td.simulate(PRISM, td.load_gait(file, PRISM))
+
+
 SURFACES = {
+    "oscillators": waving,
+    "gait files": read,
     "structures": lambda r, f: read_structure(garbled(r, f, ".yaml", yaml.dump(mutated(r, TREE)))),
     "scenarios": lambda r, f: PRISM.with_file(
         mutated(r, {"simulation": {}, "cpg": {}} | SPREAD), "a"

@@ -7,7 +7,7 @@ import pytest
 from helpers.anchored import HUNG, scenario_of
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.scenario import Scenario

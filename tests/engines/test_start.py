@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.laws.terrain import Flat, Incline
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot

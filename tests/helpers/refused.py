@@ -27,7 +27,6 @@ from helpers.made_up_walk import make_walk
 from helpers.rod import LAW, rod_with_tendons
 from tetra_drake.engines.drake import MakeDisturbedSimulator
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.figures.style import Look
 from tetra_drake.gym import TensegrityEnv, TensegrityVectorEnv
 from tetra_drake.lab.bridges.sdf import make_sdf
@@ -35,6 +34,7 @@ from tetra_drake.lab.fit.fit import fit
 from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.lab.linearization.linearization import linearize
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.lab.study.sweep import sweep
 from tetra_drake.laws.actuator import Winch

@@ -18,9 +18,9 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from tetra_drake.engines.drake import MakeSimulator
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
 from tetra_drake.lab.linearization.linearization import Linearization, linearize
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.robot.readings import first_readings

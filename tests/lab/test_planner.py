@@ -7,8 +7,8 @@ import pytest
 from helpers.anchored import HUNG, scenario_of
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.scenario import Scenario

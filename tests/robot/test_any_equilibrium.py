@@ -12,8 +12,8 @@ from helpers.anchored import BAR, HUNG, TREES, floating_prism, scenario_of, supp
 from helpers.files import DATA
 
 from tetra_drake.kernels.packed import Packed
-from tetra_drake.lab.study.equilibrium import robot_of_file
-from tetra_drake.laws.cable import TENSION
+from tetra_drake.lab.study.equilibrium import study_equilibrium
+from tetra_drake.laws.cable import MEETING, TENSION
 from tetra_drake.laws.capsules import find_touch
 from tetra_drake.laws.forces import Forces, compute_state_forces
 from tetra_drake.laws.terrain import Flat
@@ -159,6 +159,18 @@ def test_stiffness_is_how_forces_change(scenario):
         assert found == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("scenario", [floating_prism(), joined.with_arm()], ids=attrgetter("name"))
+def test_stiffness_is_how_forces_change_where_the_ends_of_a_piece_meet(scenario):
+    robot = Robot.of(scenario)
+    structure, state = robot.structure, robot.equilibrium.state.copy()
+    a, b = structure.segments.ends[-1]  # of the arm, a piece of a path
+    moved, p_WN = structure.carriers[b], node_positions(structure, state)
+    place = 7 * moved + 4
+    state[place : place + 3] += p_WN[a] - p_WN[b] + 0.3 * MEETING
+    for motion, found, expected in changes(Unactuated(robot.model), state, 1e-9):
+        assert found @ motion == pytest.approx(expected @ motion, rel=1e-6)
+
+
 TOUCHES = [([0.01, -0.1, 0.106], [0.02, 0.1, 0.107], True)]  # the second lies across the first
 TOUCHES += [([0.01, 0.003, 0.104], [0.05, 0.1, 0.13], True)]  # it ends there
 TOUCHES += [([0.103, 0.003, 0.104], [0.2, 0.1, 0.13], True)]  # both do
@@ -185,7 +197,7 @@ CROSSED = DATA / "structures/crossed.yaml"
 
 
 def test_a_structure_file_may_have_struts_that_overlap():
-    robot = robot_of_file(str(CROSSED))
+    robot = study_equilibrium(CROSSED).robot
     nodes = moved_nodes(robot.structure, robot.equilibrium.state)
     pressed = robot.weight / robot.scenario.strut_contact.stiffness
     assert find_touch(robot.model.struts, nodes, 0, 1).depth < pressed
@@ -194,7 +206,7 @@ def test_a_structure_file_may_have_struts_that_overlap():
 def test_struts_of_a_structure_file_whose_axes_meet_pass_through_each_other(tmp_path):
     file = tmp_path / "crossed.yaml"
     file.write_text(CROSSED.read_text().replace("0.005", "1e-16"))
-    robot = robot_of_file(str(file))
+    robot = study_equilibrium(file).robot
     assert not robot.model.strut_contact.acts
     assert list(overlaps(robot.scenario, robot.structure, robot.equilibrium.state)) == [
         ("a b", "c d")

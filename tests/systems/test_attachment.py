@@ -21,6 +21,7 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.laws.actuator import Force, Winch
+from tetra_drake.laws.cable import MEETING
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Flat
@@ -119,14 +120,21 @@ def test_a_hinged_rod_sinks_into_the_ground_by_half_its_weight_over_the_stiffnes
     assert depth == pytest.approx(0.5 * MASS * GRAVITY / law.stiffness, rel=1e-5)
 
 
-def test_a_cable_whose_ends_meet_is_named():
+def test_the_force_of_a_cable_fades_where_its_ends_meet_and_one_without_end_is_named():
     builder, plant, tip, _ = rod_with_tendons()
     network = AddCables(builder, plant, cables=[Cable("loop", plant.world_frame(), tip, LAW)])
     context = network.CreateDefaultContext()
-    place = [1.0, 0.0, 0.0, 0.0, -LENGTH, *np.zeros(8)]  # the rod's end at the origin
-    network.GetInputPort("state").FixValue(context, place)
-    with pytest.raises(SimulationFailure, match="'loop'"):
-        network.GetOutputPort("tensions").Eval(context)
+    for distance in (0.0, 0.3 * MEETING, MEETING, 1e200):
+        place = [1.0, 0.0, 0.0, 0.0, distance - LENGTH, *np.zeros(8)]
+        network.GetInputPort("state").FixValue(context, place)
+        if distance == 1e200:
+            with pytest.raises(SimulationFailure, match="'loop'"):
+                network.GetOutputPort("tensions").Eval(context)
+            continue
+        length = (distance**2 + MEETING**2) / (2.0 * MEETING)
+        assert network.GetOutputPort("tensions").Eval(context) == pytest.approx(60.0 * length)
+        force = network.GetOutputPort("cable_forces").Eval(context)[:3] * 60.0 * length
+        np.testing.assert_allclose(force, [60.0 * length * distance / MEETING, 0.0, 0.0])
 
 
 def test_forces_add_to_what_is_connected_to_the_plant():

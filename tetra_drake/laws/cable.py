@@ -97,6 +97,9 @@ class Curve(NamedTuple):
 
 CLOSED = 1000.0
 """Stiffness of a coil spring whose coils touch, as a multiple of its stiffness beyond."""
+MEETING = 1e-5
+"""Distance e (m) of a cable's ends below which its length is (d² + e²) / 2e for a distance d. The
+direction of a pull has no meaning where the ends meet. There the pull becomes 0 in proportion."""
 NOWHERE = 1e300
 """Stretch (m) at which unused pieces of curves start."""
 NO_CURVE = Curve.of([])

@@ -171,12 +171,13 @@ def between(nodes: Table, a: int, b: int) -> tuple[Vector3, Vector3]:
 @inlined
 def span(nodes: Table, a: int, b: int) -> tuple[Vector3, Real, Real]:
     """Direction from node a to node b, their distance (m) and its rate (m/s). `nodes` is the table
-    of laws.kinematics."""
+    of laws.kinematics. Nodes nearer than MEETING have the length that cable.MEETING tells, and its
+    gradient as direction."""
     p_AB, v_AB = between(nodes, a, b)
     square = dot(p_AB, p_AB)
-    per_length = inverse_sqrt(square)
-    direction = scaled(per_length, p_AB)
-    return direction, square * per_length, dot(v_AB, direction)
+    per_length = inverse_sqrt(maximum(square, cable.MEETING * cable.MEETING))
+    direction, length = scaled(per_length, p_AB), square * per_length
+    return direction, maximum(length, 0.5 * (length + cable.MEETING)), dot(v_AB, direction)
 
 
 @functools.partial(compiled, nogil=True)  # a call of its own: inlined, it slows other robots

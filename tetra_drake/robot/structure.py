@@ -7,7 +7,7 @@ import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -26,8 +26,10 @@ from tetra_drake.laws import cable, kinematics
 from tetra_drake.laws.model import WORLD, AnchorSprings, Couplings, Joints, NodeLoads
 from tetra_drake.laws.struts import Struts
 from tetra_drake.robot.bodies import body_inertias, strut_pose
-from tetra_drake.robot.equilibrium import Equilibrium
 from tetra_drake.scenario.blueprint import Blueprint
+
+if TYPE_CHECKING:
+    from tetra_drake.robot.equilibrium import Equilibrium
 
 STRUT_COLOUR, NODE_COLOUR = (0.33, 0.55, 0.72, 1.0), (0.13, 0.15, 0.18, 1.0)
 PASSIVE_COLOUR, ACTUATED_COLOUR = (0.0, 0.62, 0.45, 1.0), (0.76, 0.09, 0.36, 1.0)

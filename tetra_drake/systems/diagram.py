@@ -28,10 +28,9 @@ from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.matsuoka import Matsuoka
 from tetra_drake.laws.oscillator import Oscillators
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import Gait, SteeringSignal
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.attachment import Attach

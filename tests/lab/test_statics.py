@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers.structures import joined_nodes
 
-from tetra_drake.robot.statics import cable_wrenches, find_statics
+from tetra_drake.lab.study.statics import cable_wrenches, find_statics
 from tetra_drake.scenario.blueprint import Segments
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure

@@ -13,8 +13,8 @@ from helpers.actuations import FORCE, MOTOR, WINCH
 
 from tetra_drake.engines.lanes.batch import LaneThread, processor_lanes
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import Diverged, InputError
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.experiment_sections import Disturbances
