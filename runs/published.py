@@ -27,7 +27,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.lab.bridges.conversion import converted
-from tetra_drake.scenario.structure_files import save_structure
+from tetra_drake.lab.bridges.formats import save_structure
 
 OUT = Path(__file__).parent / "published"
 TIMES = np.linspace(0.0, 4.0, 401)

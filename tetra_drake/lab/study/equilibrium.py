@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
+from tetra_drake.lab.bridges.formats import names_scenario
 from tetra_drake.lab.study.statics import Statics, find_statics
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.cable import TENSION
@@ -46,7 +47,7 @@ from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenar
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
-from tetra_drake.scenario.structure_files import names_scenario, read_structure
+from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.settings.refusals import no_such
 from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
 
@@ -306,6 +307,8 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     remarks = [sinking_remark(robot), yielding_remark(robot)]
     remarks.append(overload_remark(robot, study.cables["tension"].to_numpy()))
     lines = ["Its `start` is not at rest."] if structure.start else []
+    if structure.rubbing:
+        lines.append("Friction at rings and in joints is left out: it holds robots near this pose.")
     lines += [sentence(told) for told in remarks if told]
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
