@@ -12,7 +12,7 @@ from helpers.anchored import BAR, HUNG, TREES, floating_prism, scenario_of, supp
 from helpers.files import DATA
 
 from tetra_drake.kernels.packed import Packed
-from tetra_drake.lab.study.equilibrium import robot_of_file, study_equilibrium
+from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.laws.cable import MEETING, TENSION
 from tetra_drake.laws.capsules import find_touch
 from tetra_drake.laws.forces import Forces, compute_state_forces
@@ -197,7 +197,7 @@ CROSSED = DATA / "structures/crossed.yaml"
 
 
 def test_a_structure_file_may_have_struts_that_overlap():
-    robot = robot_of_file(str(CROSSED))
+    robot = study_equilibrium(CROSSED).robot
     nodes = moved_nodes(robot.structure, robot.equilibrium.state)
     pressed = robot.weight / robot.scenario.strut_contact.stiffness
     assert find_touch(robot.model.struts, nodes, 0, 1).depth < pressed

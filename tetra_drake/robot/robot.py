@@ -112,8 +112,8 @@ class Robot:
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
                 own = cable.CableLaw(**laws[number])
-                kept = {"free_length": 0.0, "intact": own.intact}
-                laws[number] = own.cut()._replace(**kept)._asdict()
+                without = own.cut()._replace(free_length=0.0, intact=own.intact)
+                laws[number] = without._asdict()
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),

@@ -323,9 +323,9 @@ def add_joints_and_routes(
                     put_vector((0.0, 0.0, 0.0), k, SLOPE, rings)
                     if k > first:
                         weight = (1.0 if k <= ring else 0.0) - share
-                        add_vector(scaled(weight, vector_at(rings, k, ALONG)), k, SLOPE, rings)
-                        less = scaled(-weight, vector_at(rings, k, ALONG))
-                        add_vector(less, k - 1, SLOPE, rings)
+                        along = vector_at(rings, k, ALONG)
+                        add_vector(scaled(weight, along), k, SLOPE, rings)
+                        add_vector(scaled(-weight, along), k - 1, SLOPE, rings)
                 damping = time * rings[ring, DAMPING]
                 add_line(robot, solver, forces, i, pair, damping, rings, SLOPE, blocks)
         pair += (last + 1 - first) * (last + 1 - first)
