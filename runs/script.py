@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,6 +13,7 @@ from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run
 from tetra_drake.experiment import evolve
 from tetra_drake.files import read_json, read_text
+from tetra_drake.formatting import listed
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.optimizers import MakeOptimizer
 from tetra_drake.scenario.scenario import Scenario
@@ -34,6 +35,14 @@ def run_script(main: Callable[[Sequence[str]], None]) -> None:
         sys.exit(f"{name}: {error}")
     except KeyboardInterrupt:
         sys.exit(f"{name}: interrupted; the same command goes on")
+
+
+def chosen(names: Sequence[str], known: Iterable[str], what: str = "NAME") -> list[str]:
+    """The given names, or all known ones without any. Raises InputError for an unknown name."""
+    every = [*known]
+    if unknown := sorted({*names} - {*every}):
+        raise InputError(what, "", f"found {listed(unknown)}, expected {listed(every)}")
+    return [*names] or every
 
 
 def read_settings(file: Path) -> Any:

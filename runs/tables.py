@@ -4,8 +4,8 @@
 
 Each table is in a Markdown file between two lines:
 
-    <!-- table NAME: runs/tables.py -->
-    <!-- end -->
+    <!--tables.py:NAME-->
+    <!--end-->
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from PIL import Image
 from readings import RECORD, load_record
 from record import EXPERIMENTS, PICTURE
 from script import run_script
+from settle import settled
 from sine import TRIED, load_sines
 
 from tetra_drake.evolution.manifest import MANIFEST
@@ -51,12 +52,13 @@ HEIGHT = 96
 
 ENGINES = ("compiled", "diagram", "MuJoCo")
 
+OTHERS = {"undulation": "undulation-four", "rough-feedback": "rough"}
+"""Runs with which others are compared on their pages."""
+
 FAR = 5.0
 """Distance (in) from which a gait walks; of less, a difference in percent says little."""
 
-_TABLE = re.compile(
-    r"(?P<begin><!-- table (?P<name>\S+): runs/tables.py -->)\n.*?<!-- end -->", re.DOTALL
-)
+_TABLE = re.compile(r"(?P<begin><!--tables.py:(?P<name>\S+)-->)\n.*?<!--end-->", re.DOTALL)
 
 
 Runs = Mapping[str, Analysis]
@@ -152,15 +154,10 @@ def best_gait(name: str, run: Analysis) -> Best:
     # MuJoCo has Coulomb friction; under another law its distance is not one of this gait.
     alike = reached if isinstance(scenario.friction, Coulomb) else reached[:2]
     known = [*alike, reached[0] - changed, reached[0] + changed, *draws[list(DRAWN)]]
-    return Best(
-        title,
-        by_engine,
-        kept,
-        scenario.units,
-        turns,
-        relative_speed=math.nan if turns else gait[SPEED],
-        known=(math.nan, math.nan) if turns else (np.nanmin(known), np.nanmax(known)),
-    )
+    if turns:
+        return Best(title, by_engine, kept, scenario.units, turns)
+    ends = np.nanmin(known), np.nanmax(known)
+    return Best(title, by_engine, kept, scenario.units, turns, gait[SPEED], ends)
 
 
 def distances_of(run: Analysis, trial: int) -> np.ndarray:
@@ -189,17 +186,12 @@ def differences(runs: Runs) -> pandas.DataFrame:
             continue
         for trial, gait in run.best_gaits.iterrows():
             compiled, diagram, mujoco = distances_of(run, trial) / INCH
-            rows.append(
-                {
-                    "run": name,
-                    "trial": trial,
-                    "coulomb": isinstance(scenario_of(name).friction, Coulomb),
-                    "diagram": abs(diagram - compiled),
-                    "mujoco": abs(mujoco / compiled - 1.0) if abs(compiled) >= FAR else math.nan,
-                    "nanometre": gait["sensitivity_in"],
-                }
-            )
-    return pandas.DataFrame(rows)
+            share = abs(mujoco / compiled - 1.0) if abs(compiled) >= FAR else math.nan
+            coulomb = isinstance(scenario_of(name).friction, Coulomb)
+            apart = abs(diagram - compiled), share, gait["sensitivity_in"]
+            rows.append([name, trial, coulomb, *apart])
+    columns = ["run", "trial", "coulomb", "diagram", "mujoco", "nanometre"]
+    return pandas.DataFrame(rows, columns=columns)
 
 
 def trust_table(runs: Runs) -> str:
@@ -223,28 +215,14 @@ def trials_table(name: str, runs: Runs) -> str:
     Below it, the trials with another distance on the diagram, and the farthest sine."""
     run, units, rows = runs[name], scenario_of(name).units, []
     for trial in run.best_gaits.index:
-        compiled, diagram, mujoco = distances_of(run, trial)
-        row = {
-            "trial": trial,
-            "compiled": compiled / units.length,
-            "diagram": diagram / units.length,
-            "mujoco": mujoco / units.length,
-            "kept": 100.0 * run.disturbed.loc[trial, "kept"],
-            "is_apart": not abs(compiled - diagram) <= APART,
-        }
-        rows.append(row)
-    apart_by = f"{rounded(APART / units.length, 1)} {units.length_word}"
-    on_mujoco = bool(np.isfinite([row["mujoco"] for row in rows]).any())
-    sine = load_sines().get(name)
-    return rendered(
-        "trials.md",
-        rows=rows,
-        units=units,
-        apart_by=apart_by,
-        on_mujoco=on_mujoco,
-        sine=sine,
-        tried=TRIED,
-    )
+        compiled, diagram, mujoco = distances_of(run, trial) / units.length
+        row = {"trial": trial, "compiled": compiled, "diagram": diagram, "mujoco": mujoco}
+        row["kept"] = 100.0 * run.disturbed.loc[trial, "kept"]
+        rows.append(row | {"is_apart": not abs(compiled - diagram) <= APART / units.length})
+    numbers = {"rows": rows, "units": units, "sine": load_sines().get(name), "tried": TRIED}
+    numbers["apart_by"] = f"{rounded(APART / units.length, 1)} {units.length_word}"
+    numbers["on_mujoco"] = bool(np.isfinite([row["mujoco"] for row in rows]).any())
+    return rendered("trials.md", **numbers)
 
 
 def partings_table(name: str, other: str) -> str:
@@ -261,15 +239,18 @@ def pages(runs: Runs) -> list[Path]:
 def made_again(page: Path, runs: Runs) -> str:
     """Text of a page with new tables. Raises InputError if the page cannot be read."""
 
-    def make_table(name: str) -> str:
+    name = page.parent.name
+
+    def make_table(table: str) -> str:
         tables = {
             "results": lambda: results_table(runs),
             "gallery": lambda: gallery_table(runs),
             "trust": lambda: trust_table(runs),
-            "trials": lambda: trials_table(page.parent.name, runs),
-            "partings": lambda: partings_table(page.parent.name, "thesis"),
+            "trials": lambda: trials_table(name, runs),
+            "settled": lambda: settled(HERE / OTHERS[name], HERE / name).markdown(),
+            "partings": lambda: partings_table(name, "thesis"),
         }
-        return tables[name]()
+        return tables[table]()
 
     return filled(read_text(page, "page"), make_table)
 
@@ -281,12 +262,12 @@ def filled(text: str, make_table: Callable[[str], str]) -> str:
     """
 
     def remade(match: re.Match[str]) -> str:
-        if match[0].count("<!-- table ") > 1:
+        if match[0].count("<!--tables.py:") > 1:
             raise ValueError(f"table {match['name']} has no end before the next one")
-        return f"{match['begin']}\n\n{make_table(match['name']).rstrip()}\n\n<!-- end -->"
+        return f"{match['begin']}\n\n{make_table(match['name']).rstrip()}\n\n<!--end-->"
 
     text, tables = _TABLE.subn(remade, text)
-    if tables < text.count("<!-- table "):
+    if tables < text.count("<!--tables.py:"):
         raise ValueError("the last table has no end")
     return text
 

@@ -132,6 +132,9 @@ def followed(problem: Mapping[str, Any], result: SimulationResult) -> Array:
     if what == "energy":
         energy, motion = energy_of(result)
         return 1.0 + (energy - energy[0]) / motion[0]
+    if what == "centre":
+        mass = result.robot.structure.mass
+        return np.asarray(seen.p_WB.values[..., 2] @ mass / mass.sum())
     if what == "rebound":
         speeds = seen.v_WN.sel(node="a", axis="z").values
         return -speeds / speeds[0]
@@ -179,7 +182,7 @@ def order_of(problem: Mapping[str, Any], name: str) -> float | None:
     return math.log2(coarse / fine)
 
 
-def verified(name: str, engines: Mapping[str, tuple[str, str]] = ENGINES) -> dict[str, Any]:
+def verified(name: str) -> dict[str, Any]:
     """Results of a problem: curves, and for each engine the greatest errors."""
     problem = completed(name)
     if problem.get("follow") == "rest":
@@ -189,21 +192,23 @@ def verified(name: str, engines: Mapping[str, tuple[str, str]] = ENGINES) -> dic
         return own | {"engines": {"all": {"error": error}}}
     results: dict[str, Any] = {"engines": {}}
     is_smooth = problem.get("order") is not None
-    for engine, (default, fine) in engines.items():
+    for engine, (default, fine) in ENGINES.items():
         if engine in problem.get("lacks", {}):
             continue
-        try:
-            usual = run(problem, default, drift=is_smooth)
-            close = None if problem.get("long") else run(problem, fine, drift=is_smooth)
-            order = order_of(problem, engine)
-        except (SimulationFailure, InputError) as failure:
-            results["engines"][engine] = {"failure": str(failure).splitlines()[0]}
-            continue
-        size = float(np.ptp(usual["expected"])) or 1.0
-        results |= {"x": usual["x"].tolist(), "expected": usual["expected"].tolist(), "size": size}
-        results[engine] = usual["found"].tolist()
-        results["engines"][engine] = numbers_of(usual, size, "") | {"order": order}
-        results["engines"][engine] |= numbers_of(close, size, "fine_") if close else {}
+        finest = problem.get("fine", {}).get(engine, "" if problem.get("long") else fine)
+        numbers: dict[str, Any] = {"order": order_of(problem, engine)}
+        results["engines"][engine] = numbers
+        for prefix, settings in (("", default), ("fine_", finest)):
+            try:
+                found = run(problem, settings, drift=is_smooth) if settings else None
+            except (SimulationFailure, InputError) as failure:
+                numbers[f"{prefix}failure"] = str(failure).splitlines()[0]
+                continue
+            if found:
+                size = float(np.ptp(found["expected"])) or 1.0
+                results |= {k: found[k].tolist() for k in ("x", "expected")} | {"size": size}
+                results.setdefault(engine, found["found"].tolist())
+                numbers |= numbers_of(found, size, prefix)
     return results
 
 
@@ -218,6 +223,8 @@ def completed(name: str) -> dict[str, Any]:
     problem: dict[str, Any] = {"name": name} | PROBLEMS[name]
     if "beads" in problem:
         problem["tree"] = references.beads_tree(name, problem["beads"])
+    elif "rim" in problem:
+        problem["tree"] = references.disk_tree(problem["rim"])
     elif "grid" in problem:
         problem["tree"] = references.four_bar_tree(problem["grid"])
         problem["name"] = "four_bar"

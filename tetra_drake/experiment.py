@@ -104,8 +104,9 @@ def evolve(
         raise InputError("evolve", "overwrite", "excludes resume")
     out, progress = given_path(out, "evolve", "out"), progress or Progress()
 
-    given = None if scenario is None else given_scenario(scenario)
-    scenario = read_manifest(out).scenario if resume else given
+    scenario = given = None if scenario is None else given_scenario(scenario)
+    if resume:
+        tell_code(scenario := read_manifest(out).scenario, out)
     if scenario is None:
         raise InputError("scenario", "", "is needed to begin a run")
     check_scenario(scenario)
@@ -116,7 +117,6 @@ def evolve(
 
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
     if resume:
-        tell_code(scenario, out)
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
         record = RunRecord.create(

@@ -11,6 +11,7 @@ from helpers.states import energy_and_momenta
 
 from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.laws.cable import MEETING
 from tetra_drake.laws.kinematics import P_WN, V_WN
 from tetra_drake.robot.command import Command, controlled_robot
 from tetra_drake.robot.parameter_space import seeded_gait
@@ -121,6 +122,15 @@ def test_the_actuator_of_a_cut_cable_turns_freely(kind):
     assert (after.tension == 0.0).all() and (cable.tension[:5] > 0.0).all()
     start = float(cable.free_length[0])
     assert float(after.free_length[-1]) == pytest.approx(start, abs=1e-6)
+
+
+def test_two_nodes_that_a_cut_lets_meet_cost_few_steps():
+    changes = {"engine": "!Compiled", "simulation.duration": "2 s", "simulation.steady_from": "1 s"}
+    whole = load_scenario("coulomb").with_changes(changes)
+    cut = whole.with_changes({"events": [{"at": "1 s", "cut": ["T2-T3 inner bottom_left"]}]})
+    walks = [simulate(each, seeded_gait(whole, 1), record=True) for each in (whole, cut)]
+    assert walks[1].trajectory.length[-1].min() < MEETING
+    assert walks[1].integrator.steps < 10 * walks[0].integrator.steps
 
 
 def test_drawn_missing_cables_repeat_with_their_seed():

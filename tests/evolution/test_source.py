@@ -1,14 +1,27 @@
 """Gaits for commands: from a file or a run, with the scenario that they are simulated on."""
 
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
+from helpers.brief import BRIEF
 from helpers.synthetic_run import tiny_scenario, write_run
 
+import tetra_drake as td
+from tetra_drake.cli import main
 from tetra_drake.evolution.run import load_run, load_source
 from tetra_drake.robot.gait_file import given_gait, save_gait
 from tetra_drake.scenario.load import dump_scenario
+from tetra_drake.scenario.policy_kinds import imported_function
+
+WAVE = """
+import logging
+import numpy as np
+logging.getLogger("tetra_drake").warning("imported")
+def wave(readings, values, robots):
+    return robots.rest * (1.0 + 0.05 * values * np.sin(60.0 * readings.time)[:, np.newaxis])
+"""
 
 
 @pytest.fixture
@@ -40,3 +53,39 @@ def test_another_scenario_than_the_gaits_is_said_once_with_both_names(run, tmp_p
         assert load_source(source, scenario=str(other), warn=told.append).scenario.name == "other"
     assert len(told) == 3
     assert all("tiny" in text and "other" in text for text in told)
+
+
+@pytest.fixture(scope="module")
+def foreign_run(tmp_path_factory):
+    """A run whose policy is in a module beside it."""
+    folder = tmp_path_factory.mktemp("foreign")
+    (folder / "wave.py").write_text(WAVE)
+    policy = {"policy": "!Python {function: 'wave:wave', count: 1}"}
+    scenario = td.load_scenario("prism").with_changes(BRIEF | policy)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        td.evolve(scenario, folder / "run", workers=1, progress=False, report=False)
+    return folder / "run"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "figures run --out out",
+        "replay run --out page.html",
+        "replay run/trial_00/best_gait.json --out page.html",
+        "evolve --resume --out run --workers 1",
+    ],
+)
+def test_commands_name_the_code_of_a_run_before_they_import_it(
+    command, foreign_run, tmp_path, monkeypatch, caplog
+):
+    shutil.copytree(foreign_run, tmp_path / "run")
+    monkeypatch.syspath_prepend(foreign_run.parent)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delitem(sys.modules, "wave", raising=False)
+    imported_function.cache_clear()
+    caplog.clear()
+    assert main(command.split()) == 0
+    first = caplog.messages.index("imported")
+    assert any("wave:wave" in told for told in caplog.messages[:first])

@@ -54,18 +54,3 @@ def test_each_key_and_each_metric_is_explained():
             assert key in rows, key
     assert METRICS.keys() <= rows.keys()
     assert [key for key, text in rows.items() if not text] == []
-
-
-def test_what_kinds_of_a_section_have_in_common_is_told_once():
-    winch, motor = (
-        keys_page().split(f"`actuation`: `{tag}`\n")[1] for tag in ("!Winch", "!TensionMotor")
-    )
-    assert "- `actuation.max_force` (N, > 0): " in winch.split("\n## ")[0]
-    own = motor.split("\n## ")[0]
-    assert (
-        "`actuation.max_force`, `actuation.max_speed`, `actuation.motor` and `actuation.spool`: as"
-        in own
-    )
-    assert "- `actuation.time_constant` (s, > 0): " in own  # with another text
-    phase = keys_page().split("`cpg`: `!Phase`\n")[1].split("\n## ")[0]
-    assert "`cpg.start_up`" in phase and phase.rstrip().endswith("as for `!Matsuoka`")

@@ -21,6 +21,7 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.laws.actuator import Force, Winch
+from tetra_drake.laws.cable import MEETING
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Flat
@@ -30,8 +31,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems import AddCables, AddGroundContact, Cable
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
-
-WINCH = Winch(max_force=1e6, max_speed=1e3, time_constant=0.05)
 
 
 def simulated(diagram: Diagram, time: float, *, accuracy: float = 1e-6) -> Simulator:
@@ -121,26 +120,21 @@ def test_a_hinged_rod_sinks_into_the_ground_by_half_its_weight_over_the_stiffnes
     assert depth == pytest.approx(0.5 * MASS * GRAVITY / law.stiffness, rel=1e-5)
 
 
-def test_a_winch_without_limits_pulls_an_arm_as_a_force_does():
-    def angle(actuation: Winch | None) -> float:
-        builder, plant, _, cables = rod_with_tendons(free_length=0.15)
-        actuated = {"pull": ["right"]}
-        network = AddCables(builder, plant, cables=cables, actuated=actuated, actuation=actuation)
-        signal = builder.AddSystem(ConstantVectorSource([6.0]))
-        builder.Connect(signal.get_output_port(), network.GetInputPort("signals"))
-        return float(state_at(builder.Build(), 4.0)[0])
-
-    assert angle(WINCH) == pytest.approx(angle(None), abs=1e-6)
-
-
-def test_a_cable_whose_ends_meet_is_named():
+def test_the_force_of_a_cable_fades_where_its_ends_meet_and_one_without_end_is_named():
     builder, plant, tip, _ = rod_with_tendons()
     network = AddCables(builder, plant, cables=[Cable("loop", plant.world_frame(), tip, LAW)])
     context = network.CreateDefaultContext()
-    place = [1.0, 0.0, 0.0, 0.0, -LENGTH, *np.zeros(8)]  # the rod's end at the origin
-    network.GetInputPort("state").FixValue(context, place)
-    with pytest.raises(SimulationFailure, match="'loop'"):
-        network.GetOutputPort("tensions").Eval(context)
+    for distance in (0.0, 0.3 * MEETING, MEETING, 1e200):
+        place = [1.0, 0.0, 0.0, 0.0, distance - LENGTH, *np.zeros(8)]
+        network.GetInputPort("state").FixValue(context, place)
+        if distance == 1e200:
+            with pytest.raises(SimulationFailure, match="'loop'"):
+                network.GetOutputPort("tensions").Eval(context)
+            continue
+        length = (distance**2 + MEETING**2) / (2.0 * MEETING)
+        assert network.GetOutputPort("tensions").Eval(context) == pytest.approx(60.0 * length)
+        force = network.GetOutputPort("cable_forces").Eval(context)[:3] * 60.0 * length
+        np.testing.assert_allclose(force, [60.0 * length * distance / MEETING, 0.0, 0.0])
 
 
 def test_forces_add_to_what_is_connected_to_the_plant():

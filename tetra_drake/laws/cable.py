@@ -97,6 +97,9 @@ class Curve(NamedTuple):
 
 CLOSED = 1000.0
 """Stiffness of a coil spring whose coils touch, as a multiple of its stiffness beyond."""
+MEETING = 1e-5
+"""Distance e (m) of a cable's ends below which its length is (d² + e²) / 2e for a distance d. The
+direction of a pull has no meaning where the ends meet. There the pull becomes 0 in proportion."""
 NOWHERE = 1e300
 """Stretch (m) at which unused pieces of curves start."""
 NO_CURVE = Curve.of([])
@@ -113,6 +116,8 @@ class CableLaw(NamedTuple):
     intact: Real = 1.0
     """0 for a cut cable, which no actuator pulls; otherwise 1. A cut cable has no stiffness and no
     damping either."""
+    mu: Real = 0.0
+    """Coefficient of friction at the rings of a routed cable; see laws.dry_friction."""
     curve: Curve = NO_CURVE
     """Tension of the spring in place of k x."""
 
@@ -210,7 +215,8 @@ def law_of(cables: Cables, i: int) -> CableLaw:
     """Constants of cable i, from the tables of the constants of all cables."""
     law, curve = cables.law, cables.law.curve
     own = Curve(curve.rows, i * curve.pieces, curve.pieces)
-    return CableLaw(law.stiffness[i], law.damping[i], law.free_length[i], law.intact[i], own)
+    numbers = law.stiffness[i], law.damping[i], law.free_length[i], law.intact[i], law.mu[i]
+    return CableLaw(*numbers, own)
 
 
 DIRECTION, LENGTH, TENSION, TENSION_PER_RATE, RATE, CABLE_FORCE_COLUMNS = 0, 3, 4, 5, 6, 7

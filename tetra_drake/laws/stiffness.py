@@ -94,13 +94,15 @@ def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
     parts, lengthwise = forces.cable_forces[is_straight], _lengthwise(robot, forces)[is_straight]
     direction = parts[:, cable.DIRECTION : cable.DIRECTION + 3]
     along = np.einsum("ci,cj->cij", direction, direction)
-    sideways = parts[:, cable.TENSION] / parts[:, cable.LENGTH]
+    length = np.maximum(parts[:, cable.LENGTH], cable.MEETING)
+    sideways = parts[:, cable.TENSION] / length
+    turning = np.where(length > cable.MEETING, sideways, 0.0)
     return Springs(
         carriers[node_a],
         carriers[node_b],
         _motions(forces, node_a),
         -_motions(forces, node_b),
-        (lengthwise - sideways)[:, None, None] * along + sideways[:, None, None] * np.eye(3),
+        (lengthwise - turning)[:, None, None] * along + sideways[:, None, None] * np.eye(3),
     )
 
 
@@ -126,8 +128,8 @@ def _pieces(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
     node_a, node_b = routes.nodes[begins], routes.nodes[begins + 1]
     p_WN = forces.nodes[:, kinematics.P_WN : kinematics.P_WN + 3]
     p_AB = p_WN[node_b] - p_WN[node_a]
-    length = np.linalg.norm(p_AB, axis=1)
-    direction = p_AB / length[:, None]
+    length = np.maximum(np.linalg.norm(p_AB, axis=1), cable.MEETING)
+    direction = np.where(length > cable.MEETING, p_AB.T / length, 0.0).T
     across = np.eye(3) - np.einsum("pi,pj->pij", direction, direction)
     sideways = forces.cable_forces[path_of[begins], cable.TENSION] / length
     motion_a, motion_b = _motions(forces, node_a), -_motions(forces, node_b)

@@ -14,13 +14,12 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError, check_type, checked_numbers
 from tetra_drake.laws.cable import CableLaw, Curve
-from tetra_drake.robot.gait import Gait, check_parameters
+from tetra_drake.robot.gait import Gait, SteeringSignal, check_parameters
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.sensors import Sensors, shown
 from tetra_drake.robot.signals import DrivenRobot, LoopLaw, Pilot
-from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.scenario.policies import DrivenRobots
 from tetra_drake.scenario.scenario import Scenario
 

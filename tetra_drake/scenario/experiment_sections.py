@@ -11,8 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, WithJsonSchema
 
-from tetra_drake.scenario.joined_keys import different_keys
-from tetra_drake.settings.quantities import Keyed, Time
+from tetra_drake.settings.quantities import Keyed, Time, different_keys
 from tetra_drake.settings.section import Section
 
 BodyBound = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})]

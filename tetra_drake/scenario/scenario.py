@@ -23,7 +23,6 @@ from tetra_drake.scenario.experiment_sections import (
     Disturbances,
     EvolutionSection,
 )
-from tetra_drake.scenario.joined_keys import different_keys, separate
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.tolerances import (
@@ -34,7 +33,7 @@ from tetra_drake.scenario.tolerances import (
 )
 from tetra_drake.scenario.world import World
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
-from tetra_drake.settings.quantities import by_name
+from tetra_drake.settings.quantities import by_name, different_keys, separate
 from tetra_drake.settings.refusals import TAG, described, hint, refuse
 from tetra_drake.settings.section import value_at, written
 from tetra_drake.settings.units import plainest, shortest

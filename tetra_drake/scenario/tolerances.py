@@ -12,8 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from tetra_drake.on_demand import loaded
-from tetra_drake.scenario.joined_keys import different_keys
-from tetra_drake.settings.quantities import Keyed
+from tetra_drake.settings.quantities import Keyed, different_keys
 from tetra_drake.settings.refusals import Tree, joined
 from tetra_drake.settings.section import Section, tree_value
 from tetra_drake.settings.units import PATTERN, PLUS_MINUS, plain

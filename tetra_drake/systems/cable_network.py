@@ -37,11 +37,7 @@ from tetra_drake.systems.attachment import (
     check_part,
     numbers_for_each,
 )
-from tetra_drake.systems.cable_geometry import CableGeometry_, RegisterCylinders
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
-
-_LEAST_LENGTH = 1e-9
-"""Least length (m) of a cable at the start. The direction of a shorter one is not known."""
 
 
 class CableNetwork(ConvertibleSystem):
@@ -69,9 +65,9 @@ class CableNetwork(ConvertibleSystem):
 
     `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
     loop. Where the model is `slack`, a cable goes slack instead of pushing. A cable whose ends meet
-    has no direction: the outputs raise SimulationFailure.
+    does not pull; see laws.cable.MEETING.
 
-    With `parameters`, the constants of the cables are parameters of the context (4*cables,): each
+    With `parameters`, the constants of the cables are parameters of the context (5*cables,): each
     number of laws.cable.CableLaw for all cables, one after the other, then the rows of their
     curves, if any; see SetLaw().
     """
@@ -173,7 +169,7 @@ class CableNetwork(ConvertibleSystem):
         if math.isfinite(total) or not np.isfinite(state).all():
             return table
         place = int(np.argmin(np.isfinite(table).all(axis=1)))
-        reason = f"the ends of cable '{self._names[place]}' meet, or its forces are too large"
+        reason = f"the forces of cable '{self._names[place]}' are too large"
         raise SimulationFailure(time=context.get_time(), reason=reason)
 
     def _warn(self, table: np.ndarray) -> None:
@@ -215,8 +211,8 @@ class Cable:
     law: cable.CableLaw
     """Its constants in SI units."""
     rings: tuple[Frame, ...] = ()
-    """Frames at whose origins the cable runs over frictionless rings, from a to b. The cable has
-    one tension along its whole path."""
+    """Frames at whose origins the cable runs over rings, from a to b. Without friction, `law.mu`,
+    it has one tension along its whole path."""
 
     @property
     def path(self) -> tuple[Frame, ...]:
@@ -311,18 +307,9 @@ def AddCables(
         builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
         builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
     if scene_graph is not None and names:
-        named = zip(names, pieces, strict=True)
-        of_pieces = {
-            one if len(each) == 1 else f"{one} {number}": length
-            for one, each in named
-            for number, length in enumerate(each, 1)
-        }
-        source = scene_graph.RegisterSource(name)
-        cylinders = RegisterCylinders(scene_graph, source, lengths=of_pieces)
-        shown = builder.AddNamedSystem(f"{name}_geometry", CableGeometry_[float](cylinders))
-        builder.Connect(network.GetOutputPort("ends"), shown.get_input_port())
-        poses = scene_graph.get_source_pose_port(source)
-        builder.Connect(shown.get_output_port(), poses)
+        from tetra_drake.systems.cable_geometry import AddCableGeometry
+
+        AddCableGeometry(builder, scene_graph, network, dict(zip(names, pieces, strict=True)))
     return network
 
 
@@ -381,7 +368,7 @@ def _default_lengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> list[lis
         offsets = [end.CalcPose(context, start).translation() for start, end in pieces]
         of_pieces: list[float] = np.linalg.norm(offsets, axis=1).tolist()
         lengths.append(of_pieces)
-        if not all(_LEAST_LENGTH <= length < math.inf for length in of_pieces):
+        if not all(cable.MEETING <= length < math.inf for length in of_pieces):
             problem = f"found a length of {min(of_pieces):.3g} m at the plant's default positions"
             raise InputError("AddCables", f"cables.{one.name}", f"{problem}, expected more")
     return lengths

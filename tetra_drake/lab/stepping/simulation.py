@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from tetra_drake.engines.engine import check_engine
 from tetra_drake.engines.lanes.batch import LaneBatch
-from tetra_drake.engines.states import States
 from tetra_drake.errors import (
     InputError,
     SimulationFailure,
@@ -24,6 +23,7 @@ from tetra_drake.errors import (
     check_whole,
     checked_numbers,
 )
+from tetra_drake.lab.stepping.states import States
 from tetra_drake.laws.cable import NUMBERS, CableLaw
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
