@@ -94,7 +94,8 @@ def make_surface(
 
     `grid` has the terrain's heights. By default it is made from `terrain_kind`, whose steps or
     obstacles begin at x = 0 if its settings give no start."""
-    grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
+    if grid is None:
+        grid = terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
     source = origin(terrain_kind)
     check_type(source, "grid", grid, Grid)
     shapes = {"heights": np.shape(grid.heights), "corner": (2,), "cell": (2,)}
