@@ -485,7 +485,8 @@ def laika_lifts(scenario: Scenario, unknown: Unknowns, feet: Mapping[str, Any]) 
             if name in ("HL", "HR"):
                 like, pulled = ("HL", unknown["pulled in"]) if name[1] == side else ("HR", 0.0)
             a, b = (np.array(structure.nodes[node]) for node in group.pairs[0])
-            own: Any = structure.cables[like]
+            own = structure.cables[like]
+            assert own.tension is not None and own.stiffness is not None  # as the file gives them
             free = float(np.linalg.norm(a - b)) - own.tension / own.stiffness - pulled / 1e3
             law = {"stiffness": f"{own.stiffness!r} N/m", "tension": None}
             law["free_length"] = f"{free!r} m"

@@ -54,7 +54,7 @@ _READ, _PROPOSED, THESIS = read_settings(HERE / "readings.yaml").values()
 READINGS, FUTURE = (
     {k: Reading(**given) for k, given in each.items()} for each in (_READ, _PROPOSED)
 )
-"""Readings of the text, and variations that the thesis proposes, by name; THESIS: its results."""
+"""Readings, and variations that the thesis proposes, by name. THESIS has its results."""
 ALL = READINGS | FUTURE
 COARSE, FIXED = (READINGS[f"slip-{name}"].changes["engine"] for name in ("coarse", "fixed"))
 """Engines of two readings."""
