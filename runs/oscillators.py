@@ -28,7 +28,7 @@ from records import append, read
 from script import evolved, run_script
 from sine import PERIOD, peak, steady_signals
 
-from tetra_drake.engines.simulate import simulate_many
+from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.evolution.run import Run
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import read_json, write_whole
@@ -105,7 +105,7 @@ def nearest(scenario: Scenario, lags: np.ndarray) -> Gait:
     return gait(weights)
 
 
-def sine(frequency: float, lags: Sequence[float], amplitudes: Sequence[float]) -> Gait:
+def sine(frequency: float, lags: np.ndarray, amplitudes: np.ndarray) -> Gait:
     """Phase oscillators of this frequency (Hz), with these lags (degrees) and amplitudes."""
     numbers = {"frequency": frequency, "coupling": 8.0}
     numbers |= {f"amplitude {k}": each for k, each in enumerate(amplitudes, 1)}
@@ -130,7 +130,8 @@ def imitation(found: dict[str, Any]) -> dict[str, Any]:
     shapes = [(best, np.ones(4)), (lags, np.ones(4)), (lags, amplitudes)]
     gaits = [sine(frequency, *shape) for shape in shapes]
     gaits += [sine(evolved_ones["frequency_hz"], evolved_ones["lags"], np.ones(4)), gait]
-    walks = simulate_many([*[sines] * 4, network], gaits)
+    scenarios = [*[sines] * 4, network]
+    walks = [simulate(*each) for each in zip(scenarios, gaits, strict=True)]
     return {
         "share": round(share(signals, best), 3),
         "lags_deg": np.round(lags).tolist(),
