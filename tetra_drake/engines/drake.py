@@ -259,13 +259,14 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     and at most 5e-3, or 1e-2 where friction is nearly viscous; a tenth of this for robots with
     joints. If it sets no longest step, Robot.longest_step limits it.
 
-    The simulator's monitor lets steps end where contact modes change, and may replace the
-    integrator, so ask for it anew; see _StepAimer. Another monitor replaces this one.
+    The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
+    monitor replaces it. The integrator stays the same, so a caller can hold it.
     """
     check_type("MakeSimulator", "diagram", diagram, Diagram)
     check_type("MakeSimulator", "robot", robot, Robot)
     check_type("MakeSimulator", "settings", settings, Drake)
-    steps = _Steps.of(robot, settings)
+    scheme = settings.scheme or default_scheme(robot)
+    steps = _Steps.of(robot, settings.model_copy(update={"scheme": scheme}))
     simulator = _make_simulator(diagram, robot, steps)
     aimer = _StepAimer(diagram, simulator, steps, _Work(simulator))
     simulator.set_monitor(aimer.aim)
