@@ -26,11 +26,10 @@ from tetra_drake.laws.vectors import Vector3, difference, dot, sum_of
 CREEP, SPIN_CREEP = 1e-3, 1e-2
 """Slip (m/s) and relative angular velocity (rad/s) at which friction has 71 % of its limit."""
 
-ALONG, BEFORE, SHARE, DAMPING, SLOPE, RING_COLUMNS = 0, 3, 4, 5, 6, 9
-"""Columns of the table `rings` (path nodes, 9), and their number: direction of the piece that ends
-at a node; length of cable before the node (m); tension of this piece as a multiple of the first
-one's; derivative of the friction by the slip (N s/m); derivative of a slip by the node's
-position."""
+ALONG, BEFORE, SHARE, DAMPING, RING_COLUMNS = 0, 3, 4, 5, 6
+"""Columns of the table `rings` (path nodes, 6), and their number: direction of the piece that ends
+at a node; length of cable before the node, as a share; tension of this piece as a multiple of the
+first one's; derivative of the friction by the slip (N s/m)."""
 
 
 @inlined

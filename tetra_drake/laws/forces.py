@@ -39,6 +39,8 @@ class Forces(NamedTuple):
     """Derivative of a routed cable's length by the position of each node of its path."""
     rings: Annotated[Table, "route_nodes", dry_friction.RING_COLUMNS]
     """Pieces of the cables with friction at rings; see laws.dry_friction."""
+    slip_slopes: Annotated[Table, "route_nodes", 3]
+    """Derivative of the slip at a ring by the position of each node of its path."""
     ground_forces: Annotated[Table, "contacts", contact.GROUND_FORCE_COLUMNS]
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
     """Inertia of the bodies along the world's axes; unused if they are isotropic."""
@@ -231,14 +233,14 @@ def add_ring_friction(
     for k in range(first, last):
         along, part, part_rate = span(nodes, routes.nodes[k], routes.nodes[k + 1])
         if k > first:
-            slip = before_rate - before / length * stretches
+            slip = before_rate - before * stretches
             turn = dry_friction.turn_between(vector_at(rings, k, dry_friction.ALONG), along)
             ratio, damping = dry_friction.capstan(slip, cables.law.mu[i] * turn, tension)
             share = share / ratio
             rings[k, dry_friction.BEFORE], rings[k, dry_friction.DAMPING] = before, damping
         put_vector(along, k + 1, dry_friction.ALONG, rings)
         rings[k + 1, dry_friction.SHARE] = share
-        before += part
+        before += part / length
         before_rate += part_rate
         mean += share * part / length
     for k in range(first, last):
@@ -246,6 +248,19 @@ def add_ring_friction(
         pull = scaled(more, vector_at(rings, k + 1, dry_friction.ALONG))
         add_vector(pull, routes.nodes[k], kinematics.FORCE, nodes)
         add_vector(scaled(-1.0, pull), routes.nodes[k + 1], kinematics.FORCE, nodes)
+
+
+@inlined
+def put_slip_slopes(first: int, ring: int, last: int, forces: Forces) -> None:
+    """Writes the derivatives of the slip at a ring to `forces.slip_slopes`, for the path from row
+    `first` to row `last`. `ring` is its row in `forces.rings`, which add_ring_friction() wrote."""
+    rings, slopes = forces.rings, forces.slip_slopes
+    put_vector((0.0, 0.0, 0.0), first, 0, slopes)
+    for k in range(first + 1, last + 1):
+        weight = (1.0 if k <= ring else 0.0) - rings[ring, dry_friction.BEFORE]
+        along = scaled(weight, vector_at(rings, k, dry_friction.ALONG))
+        add_vector(scaled(-1.0, along), k - 1, 0, slopes)
+        put_vector(along, k, 0, slopes)
 
 
 @functools.partial(compiled, nogil=True)  # a call of its own, as for routed cables

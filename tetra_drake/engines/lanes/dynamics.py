@@ -15,22 +15,14 @@ from tetra_drake.engines.lanes.sparse import BLOCK, Schedule
 from tetra_drake.kernels.compiling import compiled, inlined, merged
 from tetra_drake.kernels.lanes import Real, Table, any_lane, named, select
 from tetra_drake.laws import contact, inertia
-from tetra_drake.laws.cable import DIRECTION, LENGTH, TENSION_PER_RATE
-from tetra_drake.laws.dry_friction import ALONG, BEFORE, DAMPING, SLOPE, spin_friction
-from tetra_drake.laws.forces import Forces, joint_spin
+from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
+from tetra_drake.laws.dry_friction import DAMPING, spin_friction
+from tetra_drake.laws.forces import Forces, joint_spin, put_slip_slopes
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
 from tetra_drake.laws.model import WORLD, Joints, Model, carriers_of
 from tetra_drake.laws.terrain import to_world
-from tetra_drake.laws.vectors import (
-    Vector3,
-    add_vector,
-    cross,
-    dot,
-    put_vector,
-    scaled,
-    vector_at,
-)
+from tetra_drake.laws.vectors import Vector3, cross, dot, put_vector, vector_at
 
 CABLES_AT_ONCE = 6
 """Number of cables of a pair of bodies whose damping is summed at once."""
@@ -313,52 +305,26 @@ def add_joints_and_routes(
                     blocks[solver.jointed[i], r, c] -= added
     routes, rings, pair = robot.cables.routes, forces.rings, 0
     for i in range(robot.couplings.first_cable[solver.coupled.size], robot.cables.signal.size):
-        damping = time * forces.cable_forces[i, TENSION_PER_RATE]
         first, last = routes.first[i], routes.first[i + 1] - 1
-        add_line(robot, solver, forces, i, pair, damping, forces.route_slopes, 0, blocks)
-        if any_lane(robot.cables.law.mu[i] > 0.0):
-            for ring in range(first + 1, last):
-                share = rings[ring, BEFORE] / forces.cable_forces[i, LENGTH]
-                for k in range(first, last + 1):
-                    put_vector((0.0, 0.0, 0.0), k, SLOPE, rings)
-                    if k > first:
-                        weight = (1.0 if k <= ring else 0.0) - share
-                        along = vector_at(rings, k, ALONG)
-                        add_vector(scaled(weight, along), k, SLOPE, rings)
-                        add_vector(scaled(-weight, along), k - 1, SLOPE, rings)
-                damping = time * rings[ring, DAMPING]
-                add_line(robot, solver, forces, i, pair, damping, rings, SLOPE, blocks)
-        pair += (last + 1 - first) * (last + 1 - first)
-
-
-@inlined
-def add_line(
-    robot: Model,
-    solver: Solver,
-    forces: Forces,
-    i: int,
-    pair: int,
-    damping: Real,
-    slopes: Table,
-    column: int,
-    blocks: Table,
-) -> None:
-    """Adds damping * l lᵀ of routed cable i to the implicit matrix `blocks`. `pair` is its first
-    one in `solver.routed`; `slopes` has the derivatives s from `column` on; see
-    add_joints_and_routes()."""
-    routes = robot.cables.routes
-    for a in range(routes.first[i], routes.first[i + 1]):
-        for b in range(routes.first[i], routes.first[i + 1]):
-            block = solver.routed[pair]
-            pair += 1
-            if block < 0:
-                continue
-            l_a = of_path(forces, routes.nodes[a], vector_at(slopes, a, column))
-            l_b = of_path(forces, routes.nodes[b], vector_at(slopes, b, column))
-            is_own = block < robot.bodies.mass.size
-            for r in range(BLOCK):
-                for c in range(r if is_own else 0, BLOCK):
-                    blocks[block, r, c] += damping * l_a[r] * l_b[c]
+        rubs, begins = any_lane(robot.cables.law.mu[i] > 0.0), pair
+        for ring in range(first, last if rubs else first + 1):  # at first the length
+            slopes, damping = forces.route_slopes, forces.cable_forces[i, TENSION_PER_RATE]
+            if ring > first:
+                slopes, damping = forces.slip_slopes, rings[ring, DAMPING]
+                put_slip_slopes(first, ring, last, forces)
+            damping, pair = time * damping, begins
+            for a in range(first, last + 1):
+                for b in range(first, last + 1):
+                    block = solver.routed[pair]
+                    pair += 1
+                    if block < 0:
+                        continue
+                    l_a = of_path(forces, routes.nodes[a], vector_at(slopes, a, 0))
+                    l_b = of_path(forces, routes.nodes[b], vector_at(slopes, b, 0))
+                    is_own = block < robot.bodies.mass.size
+                    for r in range(BLOCK):
+                        for c in range(r if is_own else 0, BLOCK):
+                            blocks[block, r, c] += damping * l_a[r] * l_b[c]
 
 
 @inlined
