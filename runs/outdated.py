@@ -1,0 +1,110 @@
+"""Tells which experiments must be recorded again, and why.
+
+    python runs/outdated.py [NAME ...]
+
+A recorded run is outdated if its experiment in experiments.yaml has another scenario, or if trial 0
+does not begin as recorded. The search of its first 600 evaluations, on the Drake diagram 60, is
+repeated with the recorded fitnesses: it must ask for the recorded parameters. Each gait that is
+kept with its parameters must go as far as recorded.
+
+Last digits do not count, as processors and versions round differently: parameters may differ by
+1e-9 of their values, distances by what a displacement by 1 nm changes (see analyse.ROUNDINGS). A
+thinned run keeps six digits of most fitnesses, so gaits that are equal in these may change places.
+CMA-ES and maps may search elsewhere on another processor, as eigenvectors of equal eigenvalues are
+arbitrary; the reason says with what the run was recorded, where that is not what is installed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from analyse import ROUNDINGS, sensitivity
+from parting import asked, made
+from record import EXPERIMENTS, HERE, Experiment
+from script import chosen, run_script
+
+from tetra_drake.evolution.evaluation import GaitEvaluation
+from tetra_drake.evolution.evaluators import evaluate_all, evaluator_of
+from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.formatting import fixed, listed
+from tetra_drake.machine import available_cores
+from tetra_drake.optimizers.base import Evaluation, Task
+from tetra_drake.settings.units import INCH
+
+EVALUATIONS, ON_DIAGRAM = 600, 60
+"""Numbers of evaluations that are repeated, on the fast engines and on the Drake diagram."""
+
+PARAMETERS = 1e-9
+"""Largest relative difference of parameters that does not count."""
+
+DISTANCE = 1e-3
+"""Difference of distances (in) that does not count for any gait. It is less than the difference of
+most gaits on two engines."""
+
+
+def why_outdated(name: str, experiment: Experiment, directory: Path) -> str:
+    """Reason to record an experiment again; empty if the run in the directory is up to date."""
+    if not (directory / MANIFEST).exists():
+        return "not recorded"
+    run = load_run(directory)
+    if differences := experiment.scenario(name).differences(run.scenario):
+        return f"scenario differs in {listed([key for key, _ in differences])}"
+    difference, others = first_difference(run), run.manifest.other_versions
+    if difference and others:
+        return f"{difference} (recorded with {listed(others)})"
+    return difference
+
+
+def first_difference(run: Run) -> str:
+    """First difference between trial 0 of a run and the same trial today; empty if only last digits
+    differ."""
+    most = ON_DIAGRAM if run.scenario.engine_name == "drake" else EVALUATIONS
+    trial, vectors = made(run, 0), asked(run, 0, most)
+    genomes = run.with_parameters.query("trial == 0 and index < @most")["index"].astype(int)
+    alike = [np.allclose(vectors[i], run.vector(0, i), rtol=PARAMETERS, atol=0.0) for i in genomes]
+    kept = genomes.tolist()[: [*alike, False].index(False)]
+    evaluate = GaitEvaluation(run.scenario)
+    with evaluator_of(evaluate, workers=available_cores(), warn=print) as evaluator:
+        tasks = [Task(vectors[index], index) for index in kept]
+        found = {task.trial: evaluation for task, evaluation in evaluate_all(evaluator, tasks)}
+    for index in kept:
+        before, now = trial.loc[index, "distance_in"], distance_in(found[index])
+        if goes_elsewhere(run, index, before, now):
+            return f"evaluation {index} goes {fixed(now, 3)} in, not {fixed(before, 3)} in"
+    if all(alike):
+        return ""
+    return f"search differs at evaluation {genomes.tolist()[len(kept)]} or earlier"
+
+
+def distance_in(evaluation: Evaluation) -> float:
+    """Distance (in) of a gait; NaN of a failure."""
+    return evaluation.metrics.get("distance", math.nan) / INCH
+
+
+def goes_elsewhere(run: Run, index: int, before: float, now: float) -> bool:
+    """True if the distance of a gait has changed by more than rounding errors explain."""
+    apart = abs(now - before)
+    if apart <= DISTANCE or (math.isnan(before) and math.isnan(now)):
+        return False
+    (change,) = sensitivity(run.scenario, [run.gait(0, index)], available_cores())
+    return not apart <= ROUNDINGS * change
+
+
+def main(names: Sequence[str]) -> None:
+    """Prints what is outdated of the experiments of the given names, or of all. Raises
+    InputError."""
+    outdated = []
+    for name in chosen(names, EXPERIMENTS):
+        reason = why_outdated(name, EXPERIMENTS[name], HERE / name)
+        print(f"{name}: {reason or 'up to date'}", flush=True)
+        outdated += [name] if reason else []
+    if outdated:
+        print(f"record again: python runs/record.py {' '.join(outdated)}")
+
+
+if __name__ == "__main__":
+    run_script(main)
