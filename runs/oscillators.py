@@ -26,7 +26,7 @@ from page import rendered
 from record import SCRATCH, load_experiments
 from records import append, read
 from script import evolved, run_script
-from sine import PERIOD, peak, steady_signals
+from sine import PERIOD, load_sines, peak, steady_signals
 
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.evolution.run import Run
@@ -206,7 +206,7 @@ def page(found: dict[str, Any]) -> str:
     """Text of the page from numbers()."""
     farthest = farthest_sine(found)
     copy = read_json(HERE / IMITATION, "record")
-    rows = {"experiments": EXPERIMENTS, "found": found, "copy": copy}
+    rows = {"experiments": EXPERIMENTS, "found": found, "copy": copy, "sines": load_sines()}
     return rendered("oscillators.md", **rows, sine=farthest, peak=PEAK)
 
 

@@ -11,6 +11,11 @@ def test_the_page_shows_its_records():
     assert oscillators.page(oscillators.numbers(RECORDS)) == page
 
 
+def test_phase_oscillators_that_evolve_on_steps_pass_the_farthest_sine_there():
+    trials = oscillators.numbers(RECORDS)["steps"]["trials"]
+    assert trials.min() > oscillators.load_sines()["steps"]["distance_in"]
+
+
 def test_phase_oscillators_pass_the_farthest_sine_in_at_least_eight_of_ten_trials():
     found = oscillators.numbers(RECORDS)
     trials = found["phases"]["trials"]
