@@ -33,7 +33,7 @@ from script import read_settings, run_script
 
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
@@ -219,7 +219,9 @@ class Entry:
             raise InputError(file, "solve", problem)
         names = [task.name for task in TASKS]
         tasks, changes = content.get("TASKS", names), content.get("CHANGES", {})
-        if not {*tasks} <= {*names}:
+        check_type(file, "TASKS", tasks, list, tuple)
+        check_type(file, "CHANGES", changes, Mapping)
+        if not {*map(str, tasks)} <= {*names}:
             problem = f"found {tasks!r:.60}, expected some of {', '.join(names)}"
             raise InputError(file, "TASKS", problem)
         about = (content["__doc__"] or file.stem).strip().split("\n")[0].rstrip(".")

@@ -50,11 +50,11 @@ class Reading:
     """Settings of SteadyState that end them."""
 
 
+_READ, _PROPOSED, THESIS = read_settings(HERE / "readings.yaml").values()
 READINGS, FUTURE = (
-    {name: Reading(**given) for name, given in part.items()}
-    for part in read_settings(HERE / "readings.yaml").values()
+    {k: Reading(**given) for k, given in each.items()} for each in (_READ, _PROPOSED)
 )
-"""Readings by name, and variations that the thesis proposes; see the file."""
+"""Readings, and variations that the thesis proposes, by name. THESIS has its results."""
 ALL = READINGS | FUTURE
 COARSE, FIXED = (READINGS[f"slip-{name}"].changes["engine"] for name in ("coarse", "fixed"))
 """Engines of two readings."""
@@ -111,17 +111,6 @@ def numbers(name: str) -> list[dict[str, float]]:
 
 
 # How near a reading is to the thesis.
-
-THESIS = {
-    "initial": 6.6,
-    "backward": 0.48,
-    "evolved": 14.34,
-    "rise": 1.32,
-    "best_rise": 1.51,
-}
-"""The thesis's results: best initial and best evolved distance (in) of ten trials, share of initial
-gaits that go backward ("nearly half"), and best evolved over best initial distance, in the mean of
-the trials and in the trial with the best gait."""
 
 
 def results(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> dict[str, np.ndarray]:

@@ -62,15 +62,15 @@ def grid(space: ParameterSpace) -> list[Vector]:
     return vectors
 
 
-def steady_signals(scenario: Scenario, gait: Gait) -> np.ndarray:
+def steady_signals(robot: Robot, gait: Gait) -> np.ndarray:
     """Signals (times, oscillators) in N of a gait after the first 5 s, every PERIOD."""
-    times = np.arange(5.0, scenario.simulation.duration, PERIOD)
-    return DrivenRobot.of(Robot.of(scenario), gait).signals_at(times)
+    times = np.arange(5.0, robot.scenario.simulation.duration, PERIOD)
+    return DrivenRobot.of(robot, gait).signals_at(times)
 
 
 def peak(scenario: Scenario, gait: Gait) -> float:
     """Peak (N) of the steady signals of a gait."""
-    return float(np.abs(steady_signals(scenario, gait)).max())
+    return float(np.abs(steady_signals(Robot.of(scenario), gait)).max())
 
 
 def load_sines() -> dict[str, dict[str, float]]:

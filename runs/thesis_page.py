@@ -174,10 +174,8 @@ def motion_errors(run: Run, engines: Iterable[str]) -> list[str]:
     """Greatest error (in) of a node's place on each engine beside a fine one, over the best gaits
     of a run."""
     exact, *others = (motions(run, engine) for engine in (FINE, *engines))
-    errors = [
-        [float(abs(a - b).max()) / INCH for a, b in zip(each, exact, strict=True)]
-        for each in others
-    ]
+    pairs = [zip(each, exact, strict=True) for each in others]
+    errors = [[float(abs(a - b).max()) / INCH for a, b in each] for each in pairs]
     return [over_trials(pandas.Series(each)) for each in errors]
 
 

@@ -145,12 +145,7 @@ def _rounded(value: Any, digits: int) -> Any:
 
 
 def _write(
-    run: Run,
-    out: Path,
-    name: str,
-    entries: Sequence[Mapping[str, Any]],
-    *,
-    trial: int | None = None,
+    run: Run, out: Path, name: str, entries: Sequence[Mapping[str, Any]], trial: int | None = None
 ) -> None:
     """Writes lines of a run to the folder `out`, compressed. Writes no file without lines."""
     file = RecordFile.of(out, run.manifest.run, name, trial=trial)

@@ -80,7 +80,7 @@ def test_a_diagram_loads_the_model_and_a_simulation_nothing_of_the_lab() -> None
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     of_diagram, of_simulation = map(str.split, done.stdout.splitlines())
     assert "tetra_drake.systems.diagram" in of_diagram
-    assert len(of_diagram) <= 67  # 60 and the empty ones of the folders
+    assert len(of_diagram) <= 64  # 60 and the empty ones of the folders
     assert "tetra_drake.robot.equilibrium" not in of_diagram
     assert "tetra_drake.engines.simulate" in of_simulation
     assert not [name for name in of_simulation if name.startswith("tetra_drake.lab")]

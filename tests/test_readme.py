@@ -215,6 +215,7 @@ RUNS = (
     "runs",
     *(f"runs/{name}" for name in EXPERIMENTS if (CHECKOUT / "runs" / name).is_dir()),
     *("runs/bench", "runs/damage", "runs/measured", "runs/oscillators", "runs/planning"),
+    *("runs/published", "runs/verification"),
 )
 """Runs of one's own may lie beside the recorded ones."""
 LINK = re.compile(r'(?:\]\(|src="|href=")([^)"]+)')

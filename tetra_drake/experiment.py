@@ -94,6 +94,9 @@ def evolve(
             check_whole("evolve", name, value, least=least)
     for name, function in (("optimizer", optimizer), ("objective", objective)):
         check_type("evolve", name, function, Callable, NoneType)
+    flags = {"resume": resume, "overwrite": overwrite, "reevaluate": reevaluate, "report": report}
+    for name, flag in flags.items():
+        check_type("evolve", name, flag, bool, NoneType)
     make_executor = maker_of(executor)
     if progress is True:
         progress = Progress(sys.stdout)

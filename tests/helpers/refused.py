@@ -19,6 +19,7 @@ from pydrake.systems.framework import DiagramBuilder
 import tetra_drake as td
 from helpers.actuations import WINCH
 from helpers.anchored import HUNG, SWINGING, TREES, scenario_of
+from helpers.bars import ACROSS, loose_bars
 from helpers.brief import BRIEF
 from helpers.controllers import OwnGround, Springs
 from helpers.converged import shortly
@@ -28,6 +29,7 @@ from tetra_drake.engines.drake import MakeDisturbedSimulator
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
 from tetra_drake.figures.style import Look
 from tetra_drake.gym import TensegrityEnv, TensegrityVectorEnv
+from tetra_drake.lab.bridges.sdf import make_sdf
 from tetra_drake.lab.fit.fit import fit
 from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.lab.linearization.linearization import linearize
@@ -47,6 +49,8 @@ from tetra_drake.robot.signals import save_signals
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems import AddCables, AddGroundContact, Cable
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+LIFTED = HUNG | {"actuated": {"lift": ["line top a"]}}
 
 
 def scenario(name: str, changes: Any = None):
@@ -103,7 +107,7 @@ def tolerant():
 
 def planner(cost: Any = (("p_WN", [0.0, 0.0, -1.0]),), scenario=None, **options):
     """A planner of a lifted mass."""
-    lifted = scenario or scenario_of(HUNG | {"actuated": {"lift": ["line top a"]}}, 0.1)
+    lifted = scenario or scenario_of(LIFTED, 0.1)
     small = {"samples": 32, "horizon": 0.1, "knots": 4, "control_period": 0.01, "workers": 1}
     given = dict(cost) if isinstance(cost, tuple) else cost
     return Planner(lifted, given, **small | {"limits": [[-1.0], [1.0]]} | options)

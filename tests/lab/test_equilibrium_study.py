@@ -10,6 +10,7 @@ from helpers import joined
 from helpers.anchored import TREES, scenario_of
 from helpers.meshcat_page import read_page
 
+from tetra_drake.lab.study import equilibrium
 from tetra_drake.lab.study.equilibrium import (
     robot_of_file,
     save_structure_page,
@@ -131,3 +132,10 @@ def test_struts_that_overlap_and_nodes_below_the_ground_are_named():
     study = study_equilibrium(Robot.of(hanging))
     assert study.nodes["z"].idxmin() == "p"
     assert f"p ({hanging.units.shown(-study.nodes['z'].min(), 'm')})" in structure_text(study)
+
+
+def test_a_rest_that_is_not_stable_has_no_frequencies(monkeypatch, refused):
+    study, squares = study_equilibrium("prism"), np.diag([-4.0, 9.0])
+    monkeypatch.setattr(equilibrium, "_vibration", lambda *_: (squares, np.eye(2), 2))
+    with refused("prism", "robot", "2 1/s"):
+        _ = study.frequencies

@@ -1,10 +1,15 @@
 """The law of a cable."""
 
+import numpy as np
 import pytest
 
 from tetra_drake.laws.cable import (
     CableLaw,
     cable_tension,
+    elastic_energy,
+    elastic_stiffness,
+    elastic_stretch,
+    elastic_tension,
     slack_tension,
 )
 
@@ -27,3 +32,11 @@ def test_a_cable_that_goes_slack_pulls_only_while_it_is_stretched(stretch, rate,
     found, per_rate = slack_tension(35.0 * stretch, rate, law)
     assert found == pytest.approx(tension, rel=1e-12)
     assert per_rate == (8.0 if tension == 11.0 else 0.0)
+
+
+@pytest.mark.parametrize("stretch", [0.0, 0.02, -0.01])
+def test_stiffness_and_energy_are_the_derivative_and_the_integral_of_the_tension(stretch):
+    law, at = CableLaw(35.0, 8.0, 0.1), np.float64(stretch)
+    assert elastic_stiffness(at, law) == 35.0
+    assert elastic_energy(at, law) == pytest.approx(0.5 * elastic_tension(at, law) * stretch)
+    assert elastic_stretch(elastic_tension(at, law), law) == pytest.approx(stretch)

@@ -49,14 +49,6 @@ def saved(heights: np.ndarray, folder) -> str:
     return str(folder / "heights.npy")
 
 
-def test_a_plane_is_exact(ground, tmp_path):
-    x, y = 0.5 * np.arange(-4, 5)[:, np.newaxis], 0.5 * np.arange(-3, 4)
-    made = ground(HeightField(file=saved(0.2 * x - 0.3 * y - 0.5, tmp_path), cell=0.5))
-    for place in ((0.0, 0.0), (0.123, -0.456), (-1.7, 1.2)):
-        expected = 0.2 * place[0] - 0.3 * place[1] - 0.5, 0.2, -0.3
-        assert at(made, *place) == pytest.approx(expected, abs=1e-14)
-
-
 def test_a_lonely_height_is_a_biquadratic_spline(ground, tmp_path):
     # The quadratic B-spline is 3/4 at its control point, 1/2 half a cell away, 1/8 a cell away.
     heights = np.zeros((101, 9))

@@ -137,6 +137,9 @@ def test_the_headline_is_what_the_objective_looks_for_and_where_it_walks(scenari
     assert headline(scenario.with_sections(**changes), metrics) == text
     backward = headline(scenario, metrics | {"distance": -2.0 * INCH})
     assert backward == "walks 2.0 inches backward in 15 s"
+    rolled, asked = metrics | {"rolled": -13.5}, scenario.with_sections(objective={"rolled": 1.0})
+    assert headline(scenario, rolled) == "rolls 2.0 inches in 15 s"
+    assert headline(asked, rolled) == "rolls 2.1 turns backward, 2.0 inches in 15 s"
 
 
 UNMET = [({"lead": 0.0126}, "lead is 0.4961 in, less than 0.5 in")]

@@ -81,7 +81,7 @@ def test_a_number_for_all_cables(robots):
     own = cables.GetMyMutableContextFromRoot(diagram.CreateDefaultContext())
     cables.SetLaw(own, CableLaw(stiffness=100.0, damping=2.0, free_length=0.05))
     law = cables.GetLaw(own)
-    assert [set(row) for row in law[:-1]] == [{100.0}, {2.0}, {0.05}, {1.0}]
+    assert [set(row) for row in law[:-1]] == [{100.0}, {2.0}, {0.05}, {1.0}, {0.0}]
 
 
 def test_tensions_have_derivatives_by_the_constants(robots):

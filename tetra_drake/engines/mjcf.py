@@ -93,7 +93,7 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     add_element(model, "compiler", inertiafromgeom="false")
     contact = {"cone": "elliptic", "impratio": _IMPRATIO}
     add_element(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
-    if not pulled and (remark := loose_remark(robot)):
+    if not own_laws and (remark := loose_remark(robot)):
         add_comment(model, remark)
     world = add_element(model, "worldbody")
     if scenario.terrain.is_ground:
@@ -148,9 +148,11 @@ def is_pulled(robot: Robot) -> bool:
 def loose_remark(robot: Robot) -> str:
     """Remark on differences between MuJoCo's tendons and the robot's cables, with names of such
     cables; "" if there are none. See tendon_faults() of laws.cable."""
-    structure, remarks = robot.structure, []
+    structure = robot.structure
+    rubs = ", ".join(structure.rubbing)
+    remarks = [f"friction at rings and in joints, left out: {rubs}"] if rubs else []
     if not robot.scenario.actuation.keeps_spring:
-        return ""
+        return "".join(remarks)
     for fault, cables in tendon_faults(structure.cables, slack=structure.slack).items():
         names = [name for name, has_it in zip(structure.cable_names, cables, strict=True) if has_it]
         some = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
@@ -334,7 +336,7 @@ def _add_joints(model: Element, structure: Structure, *, step: float) -> None:
     the largest one that is stable in explicit steps.
     """
     constraints, joints = add_element(model, "equality"), structure.joint_springs
-    for first, second, body_a, body_b, stiffness, damping in zip(*joints, strict=True):
+    for first, second, body_a, body_b, stiffness, damping, _ in zip(*joints, strict=True):
         time_constant = damping / stiffness
         k = 1.0 / (step * (step + 2.0 * time_constant))
         per_mass = 1.0 / structure.mass[body_a] + 1.0 / structure.mass[body_b]

@@ -77,6 +77,9 @@ class MujocoEngine(Engine):
         if scenario.cpg.feedback:
             problem = f"found {scenario.cpg.feedback}; mujoco computes signals beforehand"
             raise InputError(scenario.name, "cpg.feedback", problem)
+        if keys := scenario.robot.blueprint().rubbing:
+            problem = "has friction at rings or in a joint, which mujoco cannot simulate"
+            raise InputError(scenario.name, f"robot.{keys[0]}", problem)
         check_mjcf(scenario)
 
     def simulate(

@@ -116,6 +116,8 @@ class CableLaw(NamedTuple):
     intact: Real = 1.0
     """0 for a cut cable, which no actuator pulls; otherwise 1. A cut cable has no stiffness and no
     damping either."""
+    mu: Real = 0.0
+    """Coefficient of friction at the rings of a routed cable; see laws.dry_friction."""
     curve: Curve = NO_CURVE
     """Tension of the spring in place of k x."""
 
@@ -213,7 +215,8 @@ def law_of(cables: Cables, i: int) -> CableLaw:
     """Constants of cable i, from the tables of the constants of all cables."""
     law, curve = cables.law, cables.law.curve
     own = Curve(curve.rows, i * curve.pieces, curve.pieces)
-    return CableLaw(law.stiffness[i], law.damping[i], law.free_length[i], law.intact[i], own)
+    numbers = law.stiffness[i], law.damping[i], law.free_length[i], law.intact[i], law.mu[i]
+    return CableLaw(*numbers, own)
 
 
 DIRECTION, LENGTH, TENSION, TENSION_PER_RATE, RATE, CABLE_FORCE_COLUMNS = 0, 3, 4, 5, 6, 7

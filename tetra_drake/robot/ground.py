@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type, checked_numbers
 from tetra_drake.laws import terrain
 from tetra_drake.laws.contact import Ground, GroundSection, NormalForce
 from tetra_drake.laws.friction import FrictionKind
@@ -96,13 +94,21 @@ def make_surface(
 
     `grid` has the terrain's heights. By default it is made from `terrain_kind`, whose steps or
     obstacles begin at x = 0 if its settings give no start."""
-    grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
-    heights = np.ascontiguousarray(grid.heights, dtype=float)
-    fault = fault_of_heights(heights)
-    if not (np.isfinite(grid.corner).all() and 0.0 < min(grid.cell) <= max(grid.cell) < math.inf):
-        fault = f"the corner {grid.corner} and cells of {grid.cell} m"
-    if fault:
-        raise InputError(origin(terrain_kind), "grid", f"has {fault}")
+    if grid is None:
+        grid = terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
+    source = origin(terrain_kind)
+    check_type(source, "grid", grid, Grid)
+    shapes = {"heights": np.shape(grid.heights), "corner": (2,), "cell": (2,)}
+    heights, _, cell = (
+        checked_numbers(
+            value, shapes[name], source=source, key=f"grid.{name}", finite=name != "heights"
+        )
+        for name, value in vars(grid).items()
+    )
+    if fault := fault_of_heights(heights) or (
+        "" if cell.min() > 0.0 else f"cells of {grid.cell} m"
+    ):
+        raise InputError(source, "grid", f"has {fault}")
     is_stepped = terrain_kind.is_stepped
     surface_grid = terrain.SurfaceGrid.of(grid.heights, grid.corner, grid.cell, is_stepped)
     return Ground.nowhere()._replace(

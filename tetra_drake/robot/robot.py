@@ -70,7 +70,7 @@ class Robot:
                 terrain or with struts that overlap, or its start moves what is held.
         """
         scenario = scenario.with_sections(events=[]) if at_rest else scenario
-        placed = structure = _placed(scenario)
+        placed = structure = Structure.of(scenario.blueprint())
         check_apart(scenario, placed, may_overlap=at_rest)
         model = make_model(scenario.with_sections(terrain=Flat()), placed)
         start = None if at_rest else placed.start
@@ -111,8 +111,9 @@ class Robot:
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
-                law = laws[number].items()
-                laws[number] = {k: x.scaled(0.0) if k == "curve" else 0.0 for k, x in law}
+                own = cable.CableLaw(**laws[number])
+                without = own.cut()._replace(free_length=0.0, intact=own.intact)
+                laws[number] = without._asdict()
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),
@@ -160,7 +161,7 @@ class Robot:
             return self.before.equilibrium
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
-        placed = _placed(self.scenario)
+        placed = Structure.of(self.scenario.blueprint())
         if placed.settles:
             return Robot.of(self.scenario, at_rest=True).equilibrium
         return equilibrium_of(self.scenario, placed)
@@ -339,12 +340,6 @@ class Phase:
         from tetra_drake.robot.start import pushed
 
         return pushed(states, self.robot.structure, self.push)
-
-
-def _placed(scenario: World) -> Structure:
-    """The structure of a scenario's robot at the positions of its settings, before any search for
-    equilibrium. It has no contact nodes if the scenario has no ground."""
-    return Structure.of(scenario.blueprint())
 
 
 def equilibrium_of(

@@ -175,7 +175,8 @@ class Structure(Blueprint):
         """Springs that hold the nodes of ball joints together, for kernels."""
         node_a, node_b = self.joints.T.copy()
         body_a, body_b = self.carriers[node_a], self.carriers[node_b]
-        return Joints(node_a, node_b, body_a, body_b, self.joint_stiffness, self.joint_damping)
+        springs = self.joint_stiffness, self.joint_damping, self.joint_friction
+        return Joints(node_a, node_b, body_a, body_b, *springs)
 
     @property
     def loads(self) -> NodeLoads:

@@ -37,7 +37,7 @@ class Drake(EngineSettings):
     scheme: Literal["radau3", "runge_kutta3"] | None = None
     """Implicit (radau3) or explicit (runge_kutta3) integrator. By default radau3 for n up to 12
     bodies; for more runge_kutta3, unless dampers stop the fastest motion at a rate above 14 n² per
-    second."""
+    second. Where friction is nearly viscous, steps after a mode change are then explicit, too."""
     accuracy: float | None = Field(default=None, gt=0)
     """Target accuracy per step. By default half the least damping ratio of a cable, anchor or joint
     with the robot's mass, because longer steps of radau3 would damp vibrations: from 2e-5 to 0.005,

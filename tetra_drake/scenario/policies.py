@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type, checked_numbers
 from tetra_drake.laws.actuator import ActuatorKind, DrivenCables
 from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.scenario.blueprint import Blueprint
@@ -73,11 +73,14 @@ class PolicyKind(Section):
 
     def gait_parameters(self, blueprint: Blueprint) -> Mapping[str, GaitParameter]:
         """The same as parameters of a gait."""
-        found = {key: GaitParameter(*pair) for key, pair in self.parameters(blueprint).items()}
-        for key, one in found.items():
-            if not -math.inf < one.low <= one.high < math.inf:
+        found, source = {}, origin(self)
+        check_type(source, "parameters", given := self.parameters(blueprint), Mapping)
+        for key, pair in given.items():
+            low, high = checked_numbers(pair, (2,), source=source, key=str(key)).tolist()
+            if not -math.inf < low <= high < math.inf:
                 expected = "expected finite bounds, the least first"
-                raise InputError(origin(self), key, f"found {one.low} to {one.high}, {expected}")
+                raise InputError(source, key, f"found {low} to {high}, {expected}")
+            found[key] = GaitParameter(low, high)
         return found
 
     def signals(self, robots: DrivenRobots, readings: Any, values: np.ndarray) -> np.ndarray:

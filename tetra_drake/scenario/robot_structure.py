@@ -52,6 +52,7 @@ from tetra_drake.settings.quantities import (
     Position,
     Stiffness,
     Time,
+    Torque,
     quantity,
 )
 from tetra_drake.settings.refusals import described, hint, refuse
@@ -83,8 +84,8 @@ def _check_name(name: object) -> object:
     refused: they separate the parts of cable names, the parts of keys, and keys."""
     if not isinstance(name, str):
         refuse("", f"found the name {name}, expected a text, such as n{name}")
-    if re.search(r"[\s.,\[\]]", name) or not name.isprintable():
-        refuse("", f"found the name '{name}', expected one without blanks, dots, commas, brackets")
+    if not name or re.search(r"[\s.,\[\]]", name) or not name.isprintable():
+        refuse("", f"found the name '{name}', expected some without blanks, dots, commas, brackets")
     return name
 
 
@@ -165,7 +166,11 @@ class CableGroup(Section):
     """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
     default is 1 ms times its stiffness."""
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
-    """The nodes of each cable. [a, b, c] runs over a frictionless ring at b, with one tension."""
+    """The nodes of each cable. [a, b, c] runs over a ring at b."""
+    mu: float = Field(default=0.0, ge=0, le=2, exclude_if=operator.not_)
+    """Coefficient of friction at rings: over an angle theta, tensions have the ratio exp(mu theta)
+    in slip. Then the law's tension, which is shown, is the mean along the cable. What friction
+    holds creeps, with up to about 1 mm/s. A winch is at the last node of its path."""
     stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
     """Tension per elongation. Only a string or a curve needs none."""
     string: bool = Field(default=False, exclude_if=operator.not_)
@@ -205,6 +210,8 @@ class CableGroup(Section):
             refuse("curve", "found another law beside it, expected the curve alone")
         if self.string and (self.initial_tension or self.quadratic or self.cubic):
             refuse("string", "found a law of a spring beside it, expected stiffness at most")
+        if self.mu and all(len(path) == 2 for path in self.pairs):
+            refuse("mu", "found no ring in pairs, expected a path such as [a, b, c]")
         needed = {"stiffness": not (self.curve or self.string), "damping": not self.string}
         needed |= {"free_length": self.string and self.stiffness is None}
         for key, is_needed in needed.items():
@@ -233,6 +240,7 @@ class CableGroup(Section):
         curve = Curve.of_spring(stiffness, table=table, **more)
         law: dict[str, Any] = {"damping": STRING_TIME * stiffness if damping is None else damping}
         law |= {"stiffness": stiffness} | ({"curve": curve} if curve.pieces else {})
+        law |= {"mu": self.mu} if self.mu else {}
         if free_length is None:
             own_law = CableLaw(**law, free_length=distance)
             free_length = distance - elastic_stretch(group.tension or 0.0, own_law)
@@ -248,6 +256,8 @@ class BallJoint(Section):
     """Force per distance of the two nodes; by default `joint_stiffness`."""
     time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness. Below 1 ms stiff joints vibrate, and steps are short."""
+    friction: Torque = Field(default=0.0, ge=0, exclude_if=operator.not_)
+    """Torque limit of dry friction. What it holds creeps, with up to about 0.01 rad/s."""
 
 
 class JoinedBody(Section):
@@ -431,6 +441,7 @@ class StructureFile(RobotSettings):
         laws, paths, limits = [], [], []
         for cable in cables:
             is_backward = body_of[cable.nodes[0]] > body_of[cable.nodes[-1]]
+            is_backward &= not self.cables[cable.group].mu  # a winch is at the last node
             path = cable.nodes[::-1] if is_backward else cable.nodes
             places = [self.nodes[node] for node in path]
             length = sum(itertools.starmap(math.dist, itertools.pairwise(places)))
@@ -462,6 +473,7 @@ class StructureFile(RobotSettings):
             "joints": np.array(pairs, dtype=int).reshape(-1, 2),
             "joint_keys": tuple(f"joints.{name}" for name in self.joints),
             "joint_damping": np.array([joint.time_constant for joint in joints]),
+            "joint_friction": np.array([joint.friction for joint in joints]),
         }
 
     def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> dict[str, Any]:

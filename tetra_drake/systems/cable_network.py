@@ -67,7 +67,7 @@ class CableNetwork(ConvertibleSystem):
     loop. Where the model is `slack`, a cable goes slack instead of pushing. A cable whose ends meet
     does not pull; see laws.cable.MEETING.
 
-    With `parameters`, the constants of the cables are parameters of the context (4*cables,): each
+    With `parameters`, the constants of the cables are parameters of the context (5*cables,): each
     number of laws.cable.CableLaw for all cables, one after the other, then the rows of their
     curves, if any; see SetLaw().
     """
@@ -211,8 +211,8 @@ class Cable:
     law: cable.CableLaw
     """Its constants in SI units."""
     rings: tuple[Frame, ...] = ()
-    """Frames at whose origins the cable runs over frictionless rings, from a to b. The cable has
-    one tension along its whole path."""
+    """Frames at whose origins the cable runs over rings, from a to b. Without friction, `law.mu`,
+    it has one tension along its whole path."""
 
     @property
     def path(self) -> tuple[Frame, ...]:

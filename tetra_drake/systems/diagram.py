@@ -40,7 +40,6 @@ from tetra_drake.systems.ground_contact import AddGroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
 from tetra_drake.systems.oscillator_cpg import OscillatorCpg
 from tetra_drake.systems.start_up_gate import StartUpGate
-from tetra_drake.systems.state_forces import StateForces
 from tetra_drake.systems.steering import Steering
 
 
@@ -179,6 +178,8 @@ def MakeTensegrityDiagram(
     model = robot.model
     held = model.anchors.nodes.size or model.joints.node_a.size or model.loads.nodes.size
     if model.strut_contact.acts or held:
+        from tetra_drake.systems.state_forces import StateForces  # the thesis's robot has none
+
         Attach(builder, plant, builder.AddNamedSystem("state_forces", StateForces(robot)))
 
     state = plant.get_state_output_port()

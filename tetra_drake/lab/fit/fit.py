@@ -27,6 +27,7 @@ from tetra_drake.figures.style import (
 from tetra_drake.files import check_folder, given_path, read_bytes
 from tetra_drake.formatting import Say, TextTable, fixed, listed, rounded, silent
 from tetra_drake.lab.fit.measurements import FitFile, Measurement, files_of
+from tetra_drake.lab.fit.placement import unknowns_of
 from tetra_drake.lab.fit.problem import KEPT_EVALUATIONS, STEP, Bounds, FitProblem, parameter_of
 from tetra_drake.lab.page import save_findings, write_page
 from tetra_drake.optimizers.cma_es import Box, Search
@@ -209,7 +210,9 @@ def fit(
         xtol=TOLERANCE,
         gtol=np.finfo(float).eps,  # without it, no influence and no residual give NaN
     )
-    found = _result(problem, start, solution.x, time.perf_counter() - began)
+    found = _result(
+        problem, start, unknowns_of(solution, "parameters"), time.perf_counter() - began
+    )
     if folder is not None:
         save_fit(found, folder)
     return found

@@ -10,8 +10,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 from scipy.spatial.transform import Rotation
+
+from tetra_drake.errors import InputError
 
 OFFSETS, APART = 41, 0.02
 """Least number of offsets of a clock, and greatest difference (s) between them, that are tried
@@ -102,4 +104,13 @@ def nearest(
 
     unknowns = 7 if share and not frame else 1
     tolerances = {"ftol": EXACT, "xtol": EXACT, "x_scale": "jac"}
-    return moved(least_squares(lambda x: residuals(moved(x)), np.zeros(unknowns), **tolerances).x)
+    found = least_squares(lambda x: residuals(moved(x)), np.zeros(unknowns), **tolerances)
+    return moved(unknowns_of(found, "frame"))
+
+
+def unknowns_of(solution: OptimizeResult, key: str) -> np.ndarray:
+    """The unknowns that a search by SciPy has found. Raises InputError, naming `key`, if the search
+    has ended before it converged."""
+    if not solution.success:
+        raise InputError("fit", key, f"the search does not converge: {solution.message}")
+    return np.asarray(solution.x)

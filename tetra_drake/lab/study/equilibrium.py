@@ -59,7 +59,8 @@ _SWING, _STILL, _AMPLITUDE = 75, 2, 0.12
 """Number of frames of a mode on the page, and of a robot at rest; greatest displacement of a node,
 as a share of the size of the robot."""
 _NOISE = 1e-9
-"""Forces of anchors up to this share of the greatest are rounding errors."""
+"""Forces of anchors, and negative squares of frequencies, up to this share of the greatest are
+rounding errors."""
 
 _ELONGATION = 1e-6
 """Elongation of a strut for finite differences, as a share of its length."""
@@ -100,10 +101,14 @@ class EquilibriumStudy:
 
     @functools.cached_property
     def frequencies(self) -> np.ndarray:
-        """Natural frequencies without damping (modes,) in Hz, ascending. Feet slide freely."""
+        """Natural frequencies without damping (modes,) in Hz, ascending. Feet slide freely. Raises
+        InputError if a motion grows in place of swinging."""
         stiffness, mass, count = _vibration(self.robot, Unactuated(self.robot.model))
-        squares = linalg.eigvalsh(stiffness, mass)[:count]
-        return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))
+        squares = linalg.eigvalsh(stiffness, mass)
+        if squares.min(initial=0.0) < -_NOISE * np.abs(squares).max(initial=0.0):
+            problem = f"its rest is not stable: a motion grows by {math.sqrt(-squares[0]):.3g} 1/s"
+            raise InputError(self.robot.scenario.name, "robot", problem)
+        return np.asarray(np.sqrt(np.maximum(squares[:count], 0.0)) / (2.0 * math.pi))
 
     @functools.cached_property
     def modes(self) -> np.ndarray:
@@ -307,6 +312,8 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     remarks = [sinking_remark(robot), yielding_remark(robot)]
     remarks.append(overload_remark(robot, study.cables["tension"].to_numpy()))
     lines = ["Its `start` is not at rest."] if structure.start else []
+    if structure.rubbing:
+        lines.append("Friction at rings and in joints is left out: it holds robots near this pose.")
     lines += [sentence(told) for told in remarks if told]
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
