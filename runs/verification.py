@@ -1,9 +1,10 @@
 """Problems whose motion is known, on the three engines: one page.
 
-    python runs/verification.py [PROBLEM ...]
+    python runs/verification.py [films | PROBLEM ...]
 
 Simulates the problems of verification/problems.yaml, or the given ones, at the defaults and at fine
-settings of each engine, and writes the page README.md with its curves and results.json.
+settings of each engine, and writes the page README.md with its curves and results.json. `films`
+makes the page's films; they need a browser.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from tetra_drake.laws.cable import CableLaw, elastic_energy
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.parameter_space import seeded_gait
+from tetra_drake.robot.structure import turned_back
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.refusals import TAG
@@ -65,13 +67,8 @@ def cases_of(problem: Mapping[str, Any]) -> list[dict[str, Any]]:
         ]
     if grid := problem.get("grid_of"):
         return [
-            {
-                "friction.static": mu,
-                "friction.kinetic": mu,
-                "terrain": f"!Incline {{slope: {degrees} deg}}",
-                "mu": mu,
-                "degrees": degrees,
-            }
+            {"terrain": f"!Incline {{slope: {degrees} deg}}", "degrees": degrees, "mu": mu}
+            | dict.fromkeys(["friction.static", "friction.kinetic"], mu)
             for mu in grid["mu"]
             for degrees in grid["degrees"]
         ]
@@ -111,18 +108,14 @@ def energy_of(result: SimulationResult) -> tuple[Array, Array]:
     apart = ((p_WN[:, joints.node_a] - p_WN[:, joints.node_b]) ** 2).sum(axis=2)
     energy += 0.5 * (held.sum(axis=(1, 2)) + apart @ joints.stiffness)
     motion = np.zeros(len(p_WN))
-    for body, (first, end) in enumerate(
-        zip(structure.first_node[:-1], structure.first_node[1:], strict=True)
-    ):
+    for body, (first, end) in enumerate(itertools.pairwise(structure.first_node)):
         q = seen.q_WB.values[:, body]
+        unit = RotationalInertia(*structure.unit_inertia[body]).CopyToFullMatrix3()
         for time, (p, v) in enumerate(zip(p_WN[:, first:end], v_WN[:, first:end], strict=True)):
             rigid = rigid_motions(p - p_WB[time, body]).reshape(-1, 6)
             w, speed = np.split(np.linalg.lstsq(rigid, v.ravel(), rcond=1e-9)[0], 2)
-            turn = references.Rotation.from_quat(q[time, [1, 2, 3, 0]])
-            own = turn.inv().apply(w)
-            unit = RotationalInertia(*structure.unit_inertia[body]).CopyToFullMatrix3()
-            spin = own @ unit @ own
-            motion[time] += 0.5 * structure.mass[body] * (speed @ speed + spin)
+            own = turned_back(q[time], w)
+            motion[time] += 0.5 * structure.mass[body] * (speed @ speed + own @ unit @ own)
     return energy + motion, motion
 
 
@@ -166,11 +159,8 @@ def run(problem: Mapping[str, Any], engine: str, *, drift: bool = False) -> dict
         if len(cases) > 1:
             times, values, right = np.array([number]), values[-1:], right[-1:]
         x, found, expected = [*x, *times], [*found, *values], [*expected, *right]
-    numbers = {"x": x, "found": found, "expected": expected}
-    return {k: np.array(v, float) for k, v in numbers.items()} | {
-        "drift": max(drifts, default=None),
-        "s": wall,
-    }
+    numbers = {"x": np.array(x), "found": np.array(found), "expected": np.array(expected)}
+    return numbers | {"drift": max(drifts, default=None), "s": wall}
 
 
 def order_of(problem: Mapping[str, Any], name: str) -> float | None:
@@ -221,13 +211,8 @@ def numbers_of(found: Mapping[str, Any], size: float, prefix: str) -> dict[str, 
 def completed(name: str) -> dict[str, Any]:
     """A problem with its structure."""
     problem: dict[str, Any] = {"name": name} | PROBLEMS[name]
-    if "beads" in problem:
-        problem["tree"] = references.beads_tree(name, problem["beads"])
-    elif "rim" in problem:
-        problem["tree"] = references.disk_tree(problem["rim"])
-    elif "grid" in problem:
-        problem["tree"] = references.four_bar_tree(problem["grid"])
-        problem["name"] = "four_bar"
+    if made := problem.get("made"):
+        problem["tree"] = getattr(references, made[0])(*made[1:])
     elif "structure" in problem:
         problem["tree"] = problem["structure"]
     return problem
@@ -279,8 +264,21 @@ def write_page(results: Mapping[str, Any]) -> None:
     write_whole(HERE / "README.md", text)
 
 
+def save_film(name: str) -> None:
+    """Films a problem, so many times as fast as its `film` says."""
+    problem = completed(name)
+    scenario = scenario_of(problem, {}).with_changes({"engine": ENGINES["compiled"][1]})
+    result = simulate(scenario, seeded_gait(scenario), record=True)
+    film = {"size": (240, 180), "fps": 12.0, "view": "side", "speed": problem["film"]}
+    result.save_video(HERE / f"{name}.gif", **film)
+
+
 def main(names: Sequence[str]) -> None:
     """Runs problems, all without names, and writes the page."""
+    if names == ["films"]:
+        for name in (name for name, problem in PROBLEMS.items() if "film" in problem):
+            save_film(name)
+        return
     file, results = HERE / RESULTS, dict[str, Any]()
     for name in names or PROBLEMS:
         found = verified(name)

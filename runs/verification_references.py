@@ -12,7 +12,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from pydrake.multibody.tree import RotationalInertia
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RotationMatrix
+from pydrake.multibody.tree import SpatialInertia, UnitInertia
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
@@ -79,7 +81,7 @@ CORD = {"stiffness": "1 N/m", "damping": "0 N*s/m", "free_length": "900 m"}
 
 
 def four_bar(times: Array, case: Case) -> Array:
-    n = case["grid"]
+    n = case["made"][1]
     square = G * (0.5 * (n + 1) + n) / ((n + 1) * (1.0 / 3.0 + 1e-6) + n)
     return np.sin(solved(lambda _, y: [y[1], square * math.sin(y[0])], [0.0, 1.0], times)[0])
 
@@ -120,10 +122,9 @@ def turning(inertia: Array, spin: Array, arm: Array, times: Array) -> Array:
     """Ways (times, 3) of a point of a free body, by Euler's equations."""
 
     def rate(_: float, y: Array) -> Array:
-        turn, w = Rotation.from_quat(y[[1, 2, 3, 0]]), y[4:]
-        momentum = inertia @ w
+        w = y[4:]
         q = 0.5 * np.array([-y[1:4] @ w, *(y[0] * w + np.cross(y[1:4], w))])
-        return np.append(q, np.linalg.solve(inertia, np.cross(momentum, w))) if turn else q
+        return np.append(q, np.linalg.solve(inertia, np.cross(inertia @ w, w)))
 
     y = solved(rate, [1.0, 0.0, 0.0, 0.0, *spin], times)
     return np.asarray(Rotation.from_quat(y[[1, 2, 3, 0]].T).apply(arm))
@@ -182,17 +183,16 @@ def snap(times: Array, case: Case) -> Array:
 
 def precession(times: Array, case: Case) -> Array:
     structure = case["robot"].structure
-    arms = structure.p_WB - structure.mass @ structure.p_WB / structure.mass.sum()
-    inertia = np.zeros((3, 3))
-    for mass, unit, q, arm in zip(
-        structure.mass, structure.unit_inertia, structure.q_WB, arms, strict=True
-    ):
-        turn = Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix()
-        inertia += turn @ RotationalInertia(*(mass * unit)).CopyToFullMatrix3() @ turn.T
-        inertia += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    first = case["first"]
     centre = structure.mass @ structure.p_WB / structure.mass.sum()
-    return centre[2] + turning(inertia, np.array([1.0, 0.0, 6.0]), first - centre, times)[:, 2]
+    inertia = np.zeros((3, 3))
+    for mass, unit, q, p in zip(
+        structure.mass, structure.unit_inertia, structure.q_WB, structure.p_WB, strict=True
+    ):
+        body = SpatialInertia(mass, np.zeros(3), UnitInertia(*unit))
+        body = body.ReExpress(RotationMatrix(Quaternion(q))).Shift(centre - p)
+        inertia += body.CopyToFullMatrix6()[:3, :3]
+    arm = case["first"] - centre
+    return centre[2] + turning(inertia, np.array([1.0, 0.0, 6.0]), arm, times)[:, 2]
 
 
 # Contact

@@ -149,6 +149,17 @@ def commanded(rng, folder):
         raise InputError(command, "", "refused")
 
 
+SPIN = {"spin": [0, 0, "1 rad/s"], "turned": {"axis": [0, 1, 1]}}
+START = SPIN | {"velocity": ["1 m/s", 0, 0], "rest": True, "bodies": {"n0 n4": SPIN}}
+PUSH = {"at": "10 ms", "push": {"impulse": [0, 0, "1 mN*s"], "on": "n3"}}
+
+
+def begun(rng, folder):
+    start, push = mutated(rng, START), mutated(rng, PUSH)
+    changes = rng.choice([{"robot.start": start}, {"events": [push]}])
+    td.simulate(PRISM.with_changes(changes), td.seeded_gait(PRISM, 1))
+
+
 class Given(PolicyKind):
     """A policy of a plug-in with answers that do not fit."""
 
@@ -270,6 +281,7 @@ SURFACES = {
     "scenarios": lambda r, f: PRISM.with_file(
         mutated(r, {"simulation": {}, "cpg": {}} | SPREAD), "a"
     ),
+    "starts and pushes": begun,
     "MJCF": lambda r, f: converted(garbled(r, f, ".xml", (DATA / "mjcf/others.xml").read_text())),
     "NTRT": lambda r, f: converted(
         garbled(r, f, ".yaml", (DATA / "ntrt/prism.yaml").read_text()), unit="dm"

@@ -53,7 +53,7 @@ from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Phase, Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
-from tetra_drake.robot.structure import turned_back
+from tetra_drake.robot.structure import rotated, turned_back
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.world import World
 
@@ -332,9 +332,7 @@ class _MujocoRobot:
             return np.empty((0, self._model.nq + self._model.nv))
         pose = states[:, 1:end].reshape(rows, -1, 7)
         velocity = states[:, end:].reshape(rows, -1, 6)
-        scalar, vector, w_WB_B = pose[..., 3:4], pose[..., 4:], velocity[..., 3:]
-        turn = 2.0 * np.cross(vector, w_WB_B)
-        w_WB = w_WB_B + scalar * turn + np.cross(vector, turn)
+        w_WB = rotated(pose[..., 3:], velocity[..., 3:])
         parts = (pose[..., 3:], pose[..., :3]), (w_WB, velocity[..., :3])
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 

@@ -82,9 +82,6 @@ def pushed(states: np.ndarray, structure: Structure, push: Push) -> np.ndarray:
     inertia = RotationalInertia(*moments).CopyToFullMatrix3()
     moment = np.cross(p_BN, turned_back(q, np.array(push.impulse)))
     after = states.copy()
-    if p_BN.any():
-        after[..., v : v + 3] += rotated(
-            q, np.linalg.solve(inertia, moment[..., np.newaxis])[..., 0]
-        )
+    after[..., v : v + 3] += rotated(q, moment @ np.linalg.pinv(inertia, hermitian=True))
     after[..., v + 3 : v + 6] += np.divide(push.impulse, structure.mass[body])
     return after

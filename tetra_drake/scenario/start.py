@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,7 +31,7 @@ class Turn(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Turn:
-        if not any(self.axis):
+        if not 0.0 < math.hypot(*self.axis) < math.inf:
             refuse("axis", f"found {self.axis}, expected a direction")
         return self
 
@@ -51,7 +52,7 @@ class BodyStart(Section):
         from scipy.spatial.transform import Rotation
 
         turn = self.turned or Turn()
-        about_axis = turn.angle * np.divide(turn.axis, np.linalg.norm(turn.axis))
+        about_axis = turn.angle * np.divide(turn.axis, math.hypot(*turn.axis))
         after = Rotation.from_euler("xyz", [turn.roll, turn.pitch, turn.yaw])
         return after * Rotation.from_rotvec(about_axis)
 
