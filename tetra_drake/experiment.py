@@ -92,17 +92,14 @@ def evolve(
     for name, value, least in (("seed", seed, 0), ("workers", workers, 1)):
         if value is not None:
             check_whole("evolve", name, value, least=least)
-    for name, function in (("optimizer", optimizer), ("objective", objective)):
-        check_type("evolve", name, function, Callable, NoneType)
+    for name, value in {"optimizer": optimizer, "objective": objective}.items():
+        check_type("evolve", name, value, Callable, NoneType)
     flags = {"resume": resume, "overwrite": overwrite, "reevaluate": reevaluate, "report": report}
-    for name, flag in flags.items():
-        check_type("evolve", name, flag, bool, NoneType)
+    for name, value in (flags | {"progress": progress}).items():
+        check_type("evolve", name, value, bool, NoneType, *[Progress] * (name == "progress"))
     make_executor = maker_of(executor)
     if progress is True:
         progress = Progress(sys.stdout)
-    if not isinstance(progress, Progress | None) and progress is not False:
-        problem = f"found {progress!r}, expected True or an evolution.progress.Progress"
-        raise InputError("evolve", "progress", problem)
     if resume and overwrite:
         raise InputError("evolve", "overwrite", "excludes resume")
     out, progress = given_path(out, "evolve", "out"), progress or Progress()
