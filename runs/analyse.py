@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -133,18 +134,14 @@ def load_analysis(directory: Path) -> Analysis:
 
 def analysis_of(content: Mapping[str, Any]) -> Analysis:
     """Analysis of the content of analysis.json."""
-    frames = {}
+    frames = []
     for key, names in _COLUMNS.items():
         given = ({TURNED: None} | row for row in content[key])
-        rows = [{name: row[name] for name in names} for row in given]
+        rows = [[row[name] for name in names] for row in given]
         frame = pandas.DataFrame(rows, columns=names)
-        frames[key] = frame.astype({name: float for name in names if name in _NUMBERS})
-    return Analysis(
-        best_gaits=frames["best_gaits"].set_index("trial"),
-        resimulations=frames["resimulations"],
-        unseen=frames["unseen"],
-        disturbed=frames["disturbed"].set_index("gait"),
-    )
+        frames.append(frame.astype({name: float for name in names if name in _NUMBERS}))
+    best, resimulations, unseen, disturbed = frames
+    return Analysis(best.set_index("trial"), resimulations, unseen, disturbed.set_index("gait"))
 
 
 def analyse(directory: Path, *, workers: int, executor: MakeExecutor | None = None) -> None:
@@ -219,10 +216,7 @@ def outcomes(
 
 
 def resimulate(
-    scenario: Scenario,
-    gaits: Mapping[int, Gait],
-    workers: int,
-    executor: MakeExecutor | None,
+    scenario: Scenario, gaits: Mapping[int, Gait], workers: int, executor: MakeExecutor | None
 ) -> list[dict[str, Any]]:
     """Table of the gaits with every setting; see Analysis."""
     space = ParameterSpace.of(scenario)
@@ -233,11 +227,11 @@ def resimulate(
         with evaluator_of(evaluate, workers=workers, executor=executor, warn=print) as evaluator:
             evaluations = {t.trial: evaluation for t, evaluation in evaluate_all(evaluator, tasks)}
         for trial in gaits:
-            distance = json_number(evaluations[trial].metrics.get("distance", math.nan) / INCH)
-            outcome = {"distance_in": distance, "failure": evaluations[trial].failure}
-            for metric in _turned(scenario):
-                outcome[metric] = json_number(evaluations[trial].metrics.get(metric, math.nan))
-            rows.append({"trial": trial, "setting": name} | outcome)
+            found = defaultdict(lambda: math.nan, evaluations[trial].metrics)
+            row = {"trial": trial, "setting": name, "distance_in": found["distance"] / INCH}
+            row |= {"failure": evaluations[trial].failure}
+            row |= {metric: found[metric] for metric in _turned(scenario)}
+            rows.append({key: json_number(value) for key, value in row.items()})
     return rows
 
 

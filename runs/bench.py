@@ -10,13 +10,12 @@ interrupted script continues. Then the script writes the page README.md from the
 
 from __future__ import annotations
 
-import argparse
+import contextlib
 import dataclasses
 import functools
 import hashlib
-import importlib.util
 import math
-import sys
+import runpy
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -26,18 +25,18 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import pandas
 from matplotlib.figure import Figure
 from page import rendered
 from records import append, read
+from script import read_settings, run_script
 
-from tetra_drake.cli import INTERRUPTED
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import read_text, write_whole
-from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.files import write_whole
 from tetra_drake.lab.planner import Planner
 from tetra_drake.lab.study.statistics import (
     interquartile_mean,
@@ -54,11 +53,10 @@ from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.yaml_text import parse_yaml
 
 HERE = Path(__file__).parent / "bench"
 ENTRIES, FILE = HERE / "entries", HERE / "tasks.yaml"
-RECORDS, PAGE_NAME, FIGURE = "records.jsonl", "README.md", "scores"
+RECORDS, INTERVALS, PAGE_NAME, FIGURE = "records.jsonl", "scores.csv", "README.md", "scores"
 SEEDS, EPISODES = 10, 250
 """Number of solutions of each entry to each task, and the budget of one in episodes."""
 DECIMALS = 6
@@ -125,9 +123,7 @@ class Task:
             return 0.0
 
 
-TASKS = [
-    Task(name, **task) for name, task in parse_yaml(read_text(FILE, "tasks"), "tasks.yaml").items()
-]
+TASKS = [Task(name, **task) for name, task in read_settings(FILE).items()]
 
 
 class Problem:
@@ -213,28 +209,22 @@ class Entry:
         """The entry in a Python file: its function `solve`, its docstring, a list TASKS if it
         solves some tasks only, and CHANGES of their scenarios if it needs any. Raises InputError if
         it cannot be imported or has no `solve`."""
-        spec = importlib.util.spec_from_file_location(f"entry_{file.stem}", file)
-        if not file.is_file() or spec is None or spec.loader is None:
-            raise InputError(file, "", "is no Python file")
-        module = importlib.util.module_from_spec(spec)
         try:
-            spec.loader.exec_module(module)
+            content = runpy.run_path(str(file))
         except (Exception, SystemExit) as error:
-            problem = f"cannot be imported: {type(error).__name__}: {error}"
+            problem = f"cannot be run: {type(error).__name__}: {error}"
             raise InputError(file, "", problem) from error
-        solve = getattr(module, "solve", None)
-        if not callable(solve):
+        if not callable(solve := content.get("solve")):
             problem = f"found {solve!r:.60}, expected a function solve(problem, seed)"
             raise InputError(file, "solve", problem)
         names = [task.name for task in TASKS]
-        tasks = getattr(module, "TASKS", names)
+        tasks, changes = content.get("TASKS", names), content.get("CHANGES", {})
         check_type(file, "TASKS", tasks, list, tuple)
-        if unknown := set(map(str, tasks)) - set(names):
-            problem = f"found {sorted(unknown)[0]!r}, expected some of {', '.join(names)}"
-            raise InputError(file, "TASKS", problem)
-        about = (module.__doc__ or file.stem).strip().split("\n")[0].rstrip(".")
-        changes = getattr(module, "CHANGES", {})
         check_type(file, "CHANGES", changes, Mapping)
+        if not {*map(str, tasks)} <= {*names}:
+            problem = f"found {tasks!r:.60}, expected some of {', '.join(names)}"
+            raise InputError(file, "TASKS", problem)
+        about = (content["__doc__"] or file.stem).strip().split("\n")[0].rstrip(".")
         digest = hashlib.sha256(file.read_bytes()).hexdigest()[:12]
         is_shipped = file.resolve().parent == ENTRIES.resolve()
         if not is_shipped and (ENTRIES / file.name).exists():
@@ -262,12 +252,8 @@ def solved(
     wall_time = (time.perf_counter() - started) / len(seeds)
     records: list[Record] = []
     for seed, problem, solution in zip(seeds, problems, solutions, strict=True):
-        record: Record = {
-            "task": task.name,
-            "entry": entry.name,
-            "about": entry.about,
-            "seed": seed,
-        }
+        record: Record = {"task": task.name, "entry": entry.name, "about": entry.about}
+        record["seed"] = seed
         if not callable(solution):
             record["parameters"] = solution.tolist()
         record["score"] = round(task.scored(solution), DECIMALS)
@@ -287,14 +273,12 @@ def _checked(solution: Any, problem: Problem, entry: Entry) -> Solution:
     the space."""
     if callable(solution):
         return solution
-    expected = f"{len(problem.space.names)} numbers or a controller"
-    try:
+    with contextlib.suppress(TypeError, ValueError):
         vector = np.asarray(solution, dtype=float)
-    except (TypeError, ValueError):
-        vector = np.zeros(0)
-    if vector.shape != problem.space.low.shape or not np.isfinite(vector).all():
-        raise InputError(entry.name, "solve", f"returned {solution!r:.60}, expected {expected}")
-    return vector.round(DECIMALS)
+        if vector.shape == problem.space.low.shape and np.isfinite(vector).all():
+            return vector.round(DECIMALS)
+    expected = f"{len(problem.space.names)} numbers or a controller"
+    raise InputError(entry.name, "solve", f"returned {solution!r:.60}, expected {expected}")
 
 
 # The page
@@ -313,9 +297,8 @@ def shares(records: Sequence[Record]) -> dict[str, dict[str, np.ndarray]]:
     found: dict[str, dict[str, np.ndarray]] = {}
     by_place = scores(records)
     for (task, entry), values in by_place.items():
-        rivals = [v for (other, _), v in by_place.items() if other == task]
-        best = max(float(interquartile_mean(rival)) for rival in rivals)
-        found.setdefault(entry, {})[task] = values / best
+        means = [interquartile_mean(v) for (other, _), v in by_place.items() if other == task]
+        found.setdefault(entry, {})[task] = values / float(max(means))
     return found
 
 
@@ -330,10 +313,8 @@ def overall(of_tasks: Mapping[str, np.ndarray]) -> tuple[float, float, float]:
 
 def entry_names(records: Sequence[Record]) -> list[str]:
     """Names of the entries in the records, the best first."""
-    of_entries = shares(records)
-    return sorted(
-        of_entries, key=lambda name: (-len(of_entries[name]), -overall(of_entries[name])[0])
-    )
+    found = shares(records)
+    return sorted(found, key=lambda name: (-len(found[name]), -overall(found[name])[0]))
 
 
 def scores_figure(records: Sequence[Record]) -> Figure:
@@ -360,9 +341,8 @@ def numbers(records: Sequence[Record]) -> dict[str, Any]:
     entries: dict[str, Any] = {}
     for name in entry_names(records):
         own = [one for one in records if one["entry"] == name]
-        kept = [
-            one["second"] / one["score"] for one in own if one.get("second") and one["score"] > 0
-        ]
+        seconds = [one for one in own if one.get("second") and one["score"] > 0]
+        kept = [one["second"] / one["score"] for one in seconds]
         entries[name] = {
             "about": own[0]["about"],
             "tasks": len(of_entries[name]),
@@ -375,12 +355,18 @@ def numbers(records: Sequence[Record]) -> dict[str, Any]:
         mean = float(interquartile_mean(each))
         means.setdefault(task, {})[name] = (mean, *interval(each, interquartile_mean))
     highest = {task: max(of_task, key=of_task.__getitem__) for task, of_task in means.items()}
-    best = {
-        task.name: max(own, key=lambda one: one["score"])
-        for task in TASKS
-        if (own := [one for one in records if one["task"] == task.name])
-    }
+    by_score = sorted(records, key=lambda one: -one["score"])
+    bests = {one["task"]: one for one in reversed(by_score)}
+    best = {task.name: bests[task.name] for task in TASKS if task.name in bests}
     return {"entries": entries, "means": means, "highest": highest, "best": best}
+
+
+def intervals(records: Sequence[Record]) -> str:
+    """Interquartile means with their 95 % intervals as CSV."""
+    means = numbers(records)["means"]
+    rows = [[task, name, *each] for task, own in means.items() for name, each in own.items()]
+    columns = ["task", "entry", "mean", "low", "high"]
+    return str(pandas.DataFrame(rows, columns=columns).to_csv(index=False, float_format="%.6g"))
 
 
 def page(records: Sequence[Record]) -> str:
@@ -389,15 +375,9 @@ def page(records: Sequence[Record]) -> str:
     return rendered("bench.md", **settings, **numbers(records))
 
 
-def main() -> None:
+def main(files: Sequence[str]) -> None:
     """Runs the entries, and writes the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("entries", nargs="*", type=Path, help="files of entries")
-    parser.add_argument("--task", choices=[task.name for task in TASKS], help="only this task")
-    parser.add_argument("--page", action="store_true", help="only writes the page")
-    arguments = parser.parse_args()
-    files = arguments.entries or sorted(ENTRIES.glob("*.py"))
-    entries = [] if arguments.page else [Entry.of(file) for file in files]
+    entries = [Entry.of(Path(file)) for file in files or sorted(ENTRIES.glob("*.py"))]
     known = read(HERE / RECORDS)
     done = {(one["task"], one["entry"], one["seed"]) for one in known}
     for entry in entries:
@@ -407,25 +387,17 @@ def main() -> None:
     for task in TASKS:
         for entry in entries:
             seeds = [seed for seed in range(SEEDS) if (task.name, entry.name, seed) not in done]
-            if not seeds or task.name not in entry.tasks or arguments.task not in (None, task.name):
+            if not seeds or task.name not in entry.tasks:
                 continue
             records = solved(entry, task, seeds)
             append(HERE / RECORDS, records)
             mean = float(interquartile_mean([one["score"] for one in records]))
-            wall_time = sum(one["wall_s"] for one in records)
-            print(
-                f"{task.name}, {entry.name}: {mean:.3g} {task.unit}, {wall_time:.0f} s", flush=True
-            )
+            print(f"{task.name}, {entry.name}: {mean:.3g} {task.unit}", flush=True)
     records = read(HERE / RECORDS)
     save_figure(scores_figure(records), HERE, FIGURE, kinds=["svg"])
+    write_whole(HERE / INTERVALS, intervals(records))
     write_whole(HERE / PAGE_NAME, page(records))
 
 
 if __name__ == "__main__":
-    try:
-        with heeding_interrupts():
-            main()
-    except InputError as refused:
-        sys.exit(f"bench: {refused}")
-    except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
+    run_script(main)

@@ -33,15 +33,15 @@ from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import GetIntegrationSchemes, ResetIntegratorFromFlags, Simulator
-from script import read_settings, run_script
+from script import chosen, read_settings, run_script
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
-from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.formatting import TextTable, fixed, listed
+from tetra_drake.errors import SimulationFailure
+from tetra_drake.formatting import TextTable, fixed
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, controlled_robot
@@ -388,9 +388,7 @@ USUAL = [*TABLES][:3]
 
 def main(names: Sequence[str], scenario: Scenario | None = None) -> None:
     """Prints the tables of the given names, or the USUAL ones. Raises InputError."""
-    if unknown := {*names} - {*TABLES}:
-        raise InputError("TABLE", "", f"found {listed([*unknown])}, expected {listed([*TABLES])}")
-    for name in names or USUAL:
+    for name in chosen(names or USUAL, TABLES, "TABLE"):
         print(f"{TABLES[name](scenario or load_scenario('thesis')).markdown()}\n", flush=True)
 
 

@@ -106,7 +106,7 @@ def travel(trajectory: xarray.Dataset) -> dict[str, np.ndarray]:
     flies = off_ground(trajectory).groupby("contact_body").all("contact").values[1:]
     slips = trajectory.friction_mode.sel(contact=FEET, horizontal="x").values[1:] != 0
     found = {}
-    for name, during in (("flight", flies), ("slip", slips & ~flies), ("stick", ~slips & ~flies)):
+    for name, during in {"flight": flies, "slip": slips & ~flies, "stick": ~slips & ~flies}.items():
         found[name] = 100.0 * (steps * during).sum(axis=0) / steps.sum(axis=0)
         found[f"{name}_time"] = 100.0 * during.mean(axis=0)
     return found

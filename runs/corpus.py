@@ -168,7 +168,6 @@ def page(structures: pd.DataFrame, known: pd.DataFrame) -> str:
         sizes=structures[[*SIZES.values()]].quantile([0.0, 0.5, 1.0]),
         apart=apart.max(),
         moves=[f"{rounded(1e9 * far)} nm ({one})" for one, far in farthest.items()],
-        names=[f"[{name}]({name}.yaml)" for name in structures["structure"]],
     )
 
 

@@ -127,9 +127,8 @@ def possible_trials() -> list[Trial]:
 @functools.cache
 def robots() -> list[Scenario]:
     """The disturbed robots."""
-    drawn = scenario().with_changes(
-        {"disturbances": default_disturbances(scenario(), SET["percent"])}
-    )
+    disturbances = default_disturbances(scenario(), SET["percent"])
+    drawn = scenario().with_changes({"disturbances": disturbances})
     return [disturbed(drawn, draw) for draw in fresh_draws(drawn, 0, SET["seeds"])]
 
 
@@ -258,9 +257,8 @@ def plans() -> None:
         if cable:
             planner.model.damage(0, cables=[cable])
         begin = time.process_time()
-        result = simulate(
-            robot, controller=planner, control_period=SET["planner"]["control_period"]
-        )
+        period = SET["planner"]["control_period"]
+        result = simulate(robot, controller=planner, control_period=period)
         work = (time.process_time() - begin) / planner.decisions
         append(PLANS, [{"cable": cable, **speed_of(result), "cpu_s": work}])
         print(f"planner: {len(read(PLANS))} walks", flush=True)
@@ -301,14 +299,6 @@ def planned(rows: Sequence[Row]) -> pandas.DataFrame:
     return table.assign(share=table["speed"] / gait, own=table["speed"] / whole)
 
 
-def by_cable(shares: pandas.DataFrame, plans: pandas.DataFrame) -> pandas.DataFrame:
-    """Numbers of each cable, left and right ones together."""
-    table = shares.assign(back=shares["found"] >= SET["goal"]).groupby("group", sort=False)
-    medians = table[["lost", "found", "of_best", "trials"]].median()
-    counts = {"robots": table.size(), "least": table["found"].min(), "back": table["back"].mean()}
-    return medians.assign(**counts, planner=plans.groupby("group")["share"].mean())
-
-
 _PLANNER: Any = {"color": "black", "marker": "x", "linestyle": "", "markersize": 4.0}
 
 
@@ -317,10 +307,8 @@ def speed_figure(shares: pandas.DataFrame, plans: pandas.DataFrame) -> Figure:
     """Speed after damage and after trials by cable, and over the number of trials."""
     figure = Figure(figsize=(8.0, 4.6), layout="constrained")
     found = OKABE_ITO["blue"]
-    looks = {
-        "lost": ("old gait", OKABE_ITO["orange"], -0.15),
-        "found": ("after trials", found, 0.15),
-    }
+    looks = {"lost": ("old gait", OKABE_ITO["orange"], -0.15)}
+    looks["found"] = ("after trials", found, 0.15)
     by_cable, by_trial = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     names = [*reversed(dict.fromkeys(shares["group"]))]
     for height, name in enumerate(names):
@@ -362,7 +350,6 @@ def page(walks: Sequence[Row], plan_rows: Sequence[Row], candidates: Sequence[Ro
         plans=by_plan[~is_whole],
         whole=by_plan[is_whole].iloc[0],
         cpu=by_plan["cpu_s"].median(),
-        cables=by_cable(shares, by_plan),
         steady=scenario().simulation.settling_time,
         set=SET,
     )

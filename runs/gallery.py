@@ -15,20 +15,14 @@ from pathlib import Path
 
 from page import rendered
 from record import EXPERIMENTS, PICTURE, best_walk
+from script import read_settings
 from tables import HERE, best_of_all, load_all
 
 from tetra_drake.files import write_whole
 from tetra_drake.report.result_folder import REPLAY
 
 OUT, VIEWER = Path("out/gallery"), "meshcat.js"
-FIGURES = {
-    "measured/simplex.svg": "a simplex of 2 m: heights under load",
-    "measured/spine.svg": "a planar spine: poses",
-    "measured/jumper.svg": "a jumper of six struts: height of jumps",
-    "planning/goals.svg": "twenty goals, on three robots",
-    "planning/courses.svg": "courses with pillars",
-    "damage/speed.svg": "speed without each cable",
-}
+FIGURES: dict[str, str] = read_settings(HERE / "gallery.yaml")
 """Figures of other pages, with what they show."""
 
 

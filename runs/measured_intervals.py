@@ -47,7 +47,7 @@ from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.struts import axial_forces
+from tetra_drake.robot.settling import axial_forces
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario, scenario_of
 
@@ -485,14 +485,14 @@ def laika_lifts(scenario: Scenario, unknown: Unknowns, feet: Mapping[str, Any]) 
             if name in ("HL", "HR"):
                 like, pulled = ("HL", unknown["pulled in"]) if name[1] == side else ("HR", 0.0)
             a, b = (np.array(structure.nodes[node]) for node in group.pairs[0])
-            stiffness, tension = (
-                getattr(structure.cables[like], key) for key in ("stiffness", "tension")
-            )
-            free = float(np.linalg.norm(a - b)) - tension / stiffness - pulled / 1e3
-            law = {"stiffness": f"{stiffness!r} N/m", "tension": None, "free_length": f"{free!r} m"}
+            own = structure.cables[like]
+            assert own.tension is not None and own.stiffness is not None  # as the file gives them
+            free = float(np.linalg.norm(a - b)) - own.tension / own.stiffness - pulled / 1e3
+            law = {"stiffness": f"{own.stiffness!r} N/m", "tension": None}
+            law["free_length"] = f"{free!r} m"
             changes |= {f"robot.cables.{name}.{key}": value for key, value in law.items()}
-        own = drawn.with_changes(changes)
-        twists = [twisted(own, twist) for twist in (0.0, sense * TWIST)]
+        bent = drawn.with_changes(changes)
+        twists = [twisted(bent, twist) for twist in (0.0, sense * TWIST)]
         rest, less = (study_equilibrium(Robot.of(one)).nodes.loc[foot, "load"] for one in twists)
         lift = (rest - unknown["load that is seen"]) * TWIST / (rest - less)
         lift = lift * (1.0 + unknown["rest of the model"]) if rest > less else math.nan

@@ -18,8 +18,8 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.settling import axial_forces
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.robot.struts import axial_forces
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario

@@ -5,52 +5,50 @@
 Evolves each experiment of oscillators/experiments.yaml in ten trials, in out/runs, and judges the
 best gaits: at the same peak of the signals, on disturbed robots, on rough ground and on steps.
 trials.jsonl in the folder oscillators/ gets a line for each trial; experiments that are there are
-skipped. Then the script writes the page README.md and its figure.
+skipped. imitation.json has the network whose signals come nearest to the best ones. Then the script
+writes the page README.md and its figure.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cma
 import numpy as np
 from matplotlib.figure import Figure
 from page import rendered
 from record import SCRATCH, load_experiments
 from records import append, read
+from script import evolved, run_script
+from sine import PERIOD, peak, steady_signals
 
-from tetra_drake.engines.simulate import simulate_many
-from tetra_drake.errors import InputError
-from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.evolution.run import Run
-from tetra_drake.experiment import evolve
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.lab.study.robustness import PERCENT, by_gait, robustness
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 from tetra_drake.scenario.scenario import Scenario
 
 HERE = Path(__file__).parent / "oscillators"
-RECORDS = "trials.jsonl"
+RECORDS, IMITATION = "trials.jsonl", "imitation.json"
 EXPERIMENTS = load_experiments(HERE / "experiments.yaml")
 PEAK = 2.16
 """Peak (N) of the signals at which distances are compared."""
 BUDGETS = 1000, 2000, 4000
 """Numbers of gaits after which the best ones of a trial are judged."""
-TIMES = np.arange(5.0, 15.0, 0.01)
-"""Times (s) of the signals whose peak, frequency and lags are given."""
 
 
 def alike(space: ParameterSpace, evolution: Any, generator: np.random.Generator) -> Any:
@@ -67,22 +65,79 @@ def alike(space: ParameterSpace, evolution: Any, generator: np.random.Generator)
     return SimpleNamespace(ask=lambda: [each[first] for each in inner.ask()], tell=inner.tell)
 
 
-def evolved(name: str) -> Run:
-    """The run of an experiment in SCRATCH, evolved to its end."""
-    scenario, out = EXPERIMENTS[name].scenario(name), SCRATCH / name
-    resume, optimizer = (out / MANIFEST).exists(), alike if name == "alike" else None
-    return evolve(scenario, out, resume=resume, optimizer=optimizer, reevaluate=False, report=False)
-
-
-def wave(scenario: Scenario, gait: Gait) -> tuple[float, float, np.ndarray]:
-    """Peak (N), frequency (Hz) and lags (degrees) from each oscillator to the next of a gait's
-    signals."""
-    signals = DrivenRobot.of(Robot.of(scenario), gait).signals_at(TIMES)
-    spectrum = np.fft.rfft(signals - signals.mean(axis=0), axis=0)
+def wave(signals: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """The strongest wave in signals (times, oscillators): its frequency (Hz), the lags (degrees)
+    from each oscillator to the next, and its complex amplitudes."""
+    points = 8 * len(signals)
+    spectrum = np.fft.rfft(signals - signals.mean(axis=0), points, axis=0) * 2.0 / len(signals)
     strongest = int(np.abs(spectrum).sum(axis=1).argmax())
     lags = np.degrees(-np.diff(np.angle(spectrum[strongest])))
-    frequency = float(np.fft.rfftfreq(len(TIMES), TIMES[1] - TIMES[0])[strongest])
-    return float(np.abs(signals).max()), frequency, np.mod(lags + 180.0, 360.0) - 180.0
+    frequency = float(np.fft.rfftfreq(points, PERIOD)[strongest])
+    return frequency, np.mod(lags + 180.0, 360.0) - 180.0, spectrum[strongest]
+
+
+def share(signals: np.ndarray, lags: np.ndarray) -> float:
+    """Share of the power of signals that is one wave with these lags and equal amplitudes."""
+    shape = np.exp(1j * np.radians(np.cumsum([0.0, *lags])))
+    return float(
+        2.0 * abs(shape @ wave(signals)[2] / shape.size) ** 2 / np.mean(signals**2, 0).sum()
+    )
+
+
+def nearest(scenario: Scenario, lags: np.ndarray) -> Gait:
+    """The network of 10,000 whose signals have the largest share() for these lags."""
+    space, robot = ParameterSpace.of(scenario), Robot.of(scenario)
+    is_free = space.low < space.high
+    low, high = space.low[is_free], space.high[is_free]
+
+    def gait(weights: np.ndarray) -> Gait:
+        vector = space.low.copy()
+        vector[is_free] = weights
+        return space.gait(vector, name="nearest")
+
+    options = {"bounds": [low, high], "maxfevals": 10_000, "popsize": 16, "seed": 2, "verbose": -9}
+    weights, _ = cma.fmin2(
+        lambda each: -share(steady_signals(robot, gait(each)), lags),
+        0.5 * (low + high),
+        0.3 * float(high[0] - low[0]),
+        options,
+    )
+    return gait(weights)
+
+
+def sine(frequency: float, lags: np.ndarray, amplitudes: np.ndarray) -> Gait:
+    """Phase oscillators of this frequency (Hz), with these lags (degrees) and amplitudes."""
+    numbers = {"frequency": frequency, "coupling": 8.0}
+    numbers |= {f"amplitude {k}": each for k, each in enumerate(amplitudes, 1)}
+    return Gait("", numbers | {f"lag {k}->{k + 1}": x for k, x in enumerate(np.radians(lags), 1)})
+
+
+def imitation(found: dict[str, Any]) -> dict[str, Any]:
+    """How near networks come to the best signals, and what the rest costs: distances (in) of sines
+    with the best lags, with the network's, with its amplitudes too, with the lags and frequency of
+    evolved networks, and of the network itself."""
+    best, evolved_ones = found["phases"]["lags"], found["both"]
+    tau = {f"gait_bounds.tau_a_{end}": "0.07 s" for end in ("min", "max")}
+    scenario = EXPERIMENTS["low"].scenario("nearest").with_changes(tau)
+    gait = nearest(scenario.with_changes({"cpg.listing_step": "2 ms"}), best)
+    signals = steady_signals(Robot.of(scenario), gait)
+    frequency, lags, wave_of = wave(signals)
+    amplitudes = np.abs(wave_of) / np.abs(wave_of).max()
+    network = scenario.with_changes(
+        {"cpg.gain": f"{scenario.cpg.gain * PEAK / peak(scenario, gait)} N"}
+    )
+    sines = EXPERIMENTS["phases"].scenario("sines")
+    shapes = [(best, np.ones(4)), (lags, np.ones(4)), (lags, amplitudes)]
+    gaits = [sine(frequency, *shape) for shape in shapes]
+    gaits += [sine(evolved_ones["frequency_hz"], evolved_ones["lags"], np.ones(4)), gait]
+    scenarios = [*[sines] * 4, network]
+    walks = [simulate(*each) for each in zip(scenarios, gaits, strict=True)]
+    return {
+        "share": round(share(signals, best), 3),
+        "lags_deg": np.round(lags).tolist(),
+        "amplitudes": np.round(amplitudes, 2).tolist(),
+        "distances_in": [round(walk.metrics.distance_in, 1) for walk in walks],
+    }
 
 
 def judged(run: Run, trial: int) -> dict[str, Any]:
@@ -90,8 +145,9 @@ def judged(run: Run, trial: int) -> dict[str, Any]:
     table, scenario = run.evaluations[run.evaluations["trial"] == trial], run.scenario
     best = [int(table["fitness"][table["index"] < budget].idxmax()) for budget in BUDGETS]
     gaits = [run.gait(trial, int(table.loc[place, "index"])) for place in best]
-    peak, frequency, lags = wave(scenario, gaits[-1])
-    gains = [scenario.cpg.gain * PEAK / wave(scenario, gait)[0] for gait in gaits]
+    frequency, lags, _ = wave(steady_signals(Robot.of(scenario), gaits[-1]))
+    peaks = [peak(scenario, gait) for gait in gaits]
+    gains = [scenario.cpg.gain * PEAK / each for each in peaks]
     fair = [scenario.with_changes({"cpg.gain": f"{gain} N"}) for gain in gains]
     grounds = [load_scenario(name).terrain for name in ("rough", "steps")]
     others = [fair[-1].with_changes({"terrain": one, "robot.contacts": "all"}) for one in grounds]
@@ -104,7 +160,7 @@ def judged(run: Run, trial: int) -> dict[str, Any]:
     return {
         "trial": trial,
         "distances_in": inches,
-        "peak_n": round(peak, 3),
+        "peak_n": round(peaks[-1], 3),
         "frequency_hz": round(frequency, 2),
         "lags_deg": [round(float(lag)) for lag in lags],
         "rough_in": rough,
@@ -148,8 +204,10 @@ def farthest_sine(found: dict[str, Any]) -> float:
 
 def page(found: dict[str, Any]) -> str:
     """Text of the page from numbers()."""
-    sine = farthest_sine(found)
-    return rendered("oscillators.md", experiments=EXPERIMENTS, found=found, sine=sine, peak=PEAK)
+    farthest = farthest_sine(found)
+    copy = read_json(HERE / IMITATION, "record")
+    rows = {"experiments": EXPERIMENTS, "found": found, "copy": copy}
+    return rendered("oscillators.md", **rows, sine=farthest, peak=PEAK)
 
 
 def main(names: Sequence[str]) -> None:
@@ -157,17 +215,17 @@ def main(names: Sequence[str]) -> None:
     done = {one["experiment"] for one in read(HERE / RECORDS)}
     for name in [] if "--page" in names else names or EXPERIMENTS:
         if name not in done:
-            run = evolved(name)
+            optimizer = alike if name == "alike" else None
+            run = evolved(EXPERIMENTS[name].scenario(name), SCRATCH / name, optimizer)
             lines = [judged(run, trial) for trial in range(run.scenario.evolution.trials)]
             append(HERE / RECORDS, [{"experiment": name} | one for one in lines])
             print(name, [one["distances_in"][-1] for one in lines], flush=True)
     found = numbers(read(HERE / RECORDS))
+    if not (HERE / IMITATION).exists():
+        write_whole(HERE / IMITATION, json.dumps(imitation(found)) + "\n")
     save_figure(trials_figure(found, farthest_sine(found)), HERE, "trials", kinds=["svg"])
     write_whole(HERE / "README.md", page(found))
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"oscillators.py: {error}")
+    run_script(main)

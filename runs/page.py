@@ -16,7 +16,7 @@ import jinja2
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import fixed, listed, ranged, rounded
+from tetra_drake.formatting import fixed, listed, rounded
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -48,11 +48,6 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}"
 
 
-def spanned(values: Sequence[float]) -> str:
-    """A number and its range, (number, low, high), as text with three significant digits."""
-    return ranged(*values)
-
-
 @functools.cache
 def _environment() -> jinja2.Environment:
     """Settings of all templates, with the filters."""
@@ -64,7 +59,7 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    functions = (fixed, rounded, listed, percent, median, over, significant, spanned)
+    functions = (fixed, rounded, listed, percent, median, over, significant)
     environment.filters.update({each.__name__: each for each in functions})
     return environment
 

@@ -55,12 +55,8 @@ def partings(first: Run, second: Run) -> pandas.DataFrame:
         ours, theirs = made(first, trial), made(second, trial)
         apart = (ours["distance_in"] - theirs["distance_in"]).abs().head(alike)
         best = [gaits.loc[gaits["fitness"].head(len(ours)).idxmax()] for gaits in (ours, theirs)]
-        rows[trial] = {
-            "evaluations": len(ours),
-            "alike": alike,
-            "apart": apart.median(),
-            "farthest": apart.max(),
-            "first_best": best[0]["distance_in"],
-            "second_best": best[1]["distance_in"],
-        }
-    return pandas.DataFrame.from_dict(rows, orient="index").rename_axis("trial")
+        bests = (one["distance_in"] for one in best)
+        rows[trial] = [len(ours), alike, apart.median(), apart.max(), *bests]
+    columns = ["evaluations", "alike", "apart", "farthest", "first_best", "second_best"]
+    table = pandas.DataFrame.from_dict(rows, orient="index", columns=columns)
+    return table.rename_axis("trial")

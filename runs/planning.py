@@ -40,11 +40,9 @@ from planning_page import (
 )
 from records import append
 from scipy.ndimage import map_coordinates
-from script import evolved, run_script
+from script import chosen, evolved, run_script
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError
-from tetra_drake.formatting import listed
 from tetra_drake.lab.planner import Planner
 from tetra_drake.lab.prototype.export import COMMAND, export
 from tetra_drake.lab.study.robustness import default_disturbances
@@ -283,9 +281,8 @@ def others() -> list[Episode]:
             own = {"plant": each["climb"], "planning": gait["planner"]}
             own["make_command"] = climbing_command
         most = each.get("most", 60.0)
-        episodes.append(
-            Episode("others", each["name"], task, each["base"], changes, most=most, **own)
-        )
+        named = partial(Episode, "others", each["name"], task, each["base"], changes)
+        episodes.append(named(most=most, **own))
     return episodes
 
 
@@ -324,12 +321,8 @@ def run_episode(episode: Episode) -> tuple[Record, SimulationResult]:
     with contextlib.suppress(Over):
         simulate(longer, controller=act, control_period=period)
     short = scenario.with_changes({"simulation.duration": f"{period * len(actions):.6g} s"})
-    result = simulate(
-        short,
-        controller=lambda now, _: actions[round(now / period)],
-        control_period=period,
-        record=True,
-    )
+    again = partial(simulate, short, control_period=period, record=True)
+    result = again(controller=lambda now, _: actions[round(now / period)])
     record = recorded(episode, result) | task.found(result.trajectory.p_WN.values)
     record |= {"is_done": is_done, "cpu": cpu, "wall": planner.wall_times, "load": load}
     record |= {key: np.round(record[key], 3).tolist() for key in ("cpu", "wall", "load")}
@@ -373,9 +366,8 @@ def run_all(episodes: Sequence[Episode], folder: Path) -> None:
 def main(groups: Sequence[str], folder: Path = HERE) -> None:
     """Runs the episodes of groups, or all, films the slalom, and writes the page. Raises
     InputError."""
-    if unknown := {*groups} - {*GROUPS}:
-        raise InputError("GROUP", "", f"found {listed([*unknown])}, expected {listed(GROUPS)}")
-    run_all([each for each in all_episodes() if not groups or each.group in groups], folder)
+    groups = chosen(groups, GROUPS, "GROUP")
+    run_all([each for each in all_episodes() if each.group in groups], folder)
     if not (folder / FILM).exists():
         slalom, *_ = courses()
         film(run_episode(slalom)[1], EPISODES["courses"]["slalom"]["pillars"], folder / FILM)

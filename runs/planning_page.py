@@ -28,15 +28,7 @@ HERE = Path(__file__).parent / "planning"
 RECORDS, FILM = "records.jsonl", "slalom.gif"
 EPISODES: dict[str, Any] = read_settings(HERE / "episodes.yaml")
 """What is run, see the file."""
-GROUPS = (
-    "goals, compiled",
-    "courses",
-    "goals, MuJoCo",
-    "goals, disturbed",
-    "speeds",
-    "others",
-    "real time",
-)
+GROUPS: list[str] = EPISODES["groups"]
 """Groups of episodes, in the order of the runs."""
 NEAR, PILLAR = 0.3, 0.1
 """Distance (m) of the centre from a goal that is reached, and radius (m) of pillars."""
@@ -82,9 +74,8 @@ def film(result: SimulationResult, pillars: Sequence[Sequence[float]], file: Pat
         for x, y in pillars:
             draw_pillar(axes, x, y, zorder=1 if y > behind else 4)
         axes.plot(*seen[ends].transpose(2, 1, 0), color="0.6", linewidth=0.6, zorder=2)
-        axes.plot(
-            *seen[structure.struts].transpose(2, 1, 0), color="black", linewidth=1.8, zorder=3
-        )
+        struts = seen[structure.struts].transpose(2, 1, 0)
+        axes.plot(*struts, color="black", linewidth=1.8, zorder=3)
         axes.set(xlim=(-0.5, 6.5), ylim=(-1.2, 1.42), aspect="equal")
         axes.set_axis_off()
         canvas.draw()
@@ -184,9 +175,7 @@ def write_page(folder: Path, planned: Mapping[str, int]) -> None:
     }
     cpu = {name: [each["cpu"] for each in of] for name, of in groups.items() if of}
     walls = [record["wall"] for record in groups["real time"]]
-    of_goals = itertools.chain(
-        *(times for name, of in cpu.items() if name in goals for times in of)
-    )
+    of_goals = itertools.chain(*(times for name in goals for times in cpu.get(name, [])))
     text = rendered(
         "planning.md",
         given=EPISODES,

@@ -17,13 +17,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pandas
-from script import evolved, read_record, read_settings, run_script
+from script import chosen, evolved, read_record, read_settings, run_script
 
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import check_file, write_whole
-from tetra_drake.formatting import listed, ranged
-from tetra_drake.lab.study.statistics import interval, interval_of_resamples, resampled
+from tetra_drake.formatting import ranged
+from tetra_drake.lab.study.statistics import interval_of_resamples, resampled
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
@@ -51,11 +50,11 @@ class Reading:
     """Settings of SteadyState that end them."""
 
 
+_READ, _PROPOSED, THESIS = read_settings(HERE / "readings.yaml").values()
 READINGS, FUTURE = (
-    {name: Reading(**given) for name, given in part.items()}
-    for part in read_settings(HERE / "readings.yaml").values()
+    {k: Reading(**given) for k, given in each.items()} for each in (_READ, _PROPOSED)
 )
-"""Readings by name, and variations that the thesis proposes; see the file."""
+"""Readings, and variations that the thesis proposes, by name. THESIS has its results."""
 ALL = READINGS | FUTURE
 COARSE, FIXED = (READINGS[f"slip-{name}"].changes["engine"] for name in ("coarse", "fixed"))
 """Engines of two readings."""
@@ -113,17 +112,6 @@ def numbers(name: str) -> list[dict[str, float]]:
 
 # How near a reading is to the thesis.
 
-THESIS = {
-    "initial": 6.6,
-    "backward": 0.48,
-    "evolved": 14.34,
-    "rise": 1.32,
-    "best_rise": 1.51,
-}
-"""The thesis's results: best initial and best evolved distance (in) of ten trials, share of initial
-gaits that go backward ("nearly half"), and best evolved over best initial distance, in the mean of
-the trials and in the trial with the best gait."""
-
 
 def results(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> dict[str, np.ndarray]:
     """Results (...) of our trials, by the names in THESIS. `drawn` (..., trials) has the rows that
@@ -177,18 +165,11 @@ def off_by(trials: pandas.DataFrame) -> str:
     return ranged(float(factor(trials)), *factor_interval(trials))
 
 
-def mean_of(values: pandas.Series) -> str:
-    """Text of a mean over the trials with its 95 % interval."""
-    return ranged(values.mean(), *interval(values))
-
-
 def main(names: Sequence[str]) -> None:
     """Records the readings of these names, or all. Raises InputError."""
-    if unknown := {*names} - {*ALL}:
-        problem = f"found {listed(sorted(unknown))}, expected {listed([*ALL])}"
-        raise InputError("NAME", "", problem)
+    names = chosen(names, ALL)
     check_file(RECORD)
-    for name in names or ALL:
+    for name in names:
         record = load_record(RECORD) if RECORD.exists() else {}
         if name not in record:
             made = record | {name: numbers(name)}

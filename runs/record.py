@@ -1,14 +1,14 @@
 """Makes the recorded runs in the folder of this file from nothing.
 
-    python runs/record.py [--so-far] [NAME ...]
+    python runs/record.py [NAME ...]
 
 Each experiment is evolved and analysed in a folder of out/runs, then thinned into a folder here. A
 picture (made by Chromium from a replay) and a gait diagram show its best gait. Experiments in
 README.md are filmed, too. After an interruption the script continues; finished experiments are
 skipped. times.json has the time of each experiment.
 
-With --so-far, the folders here get what there is of experiments that are being evolved. Such a run
-is whole, not thinned: where out/runs has none, the script goes on from it.
+A run here that is whole, not thinned, is not finished: where out/runs has none, the script goes on
+from it.
 """
 
 from __future__ import annotations
@@ -28,25 +28,24 @@ from pathlib import Path
 from typing import Any
 
 from analyse import ANALYSIS, analyse
+from script import chosen, read_settings, run_script
 from thinning import thin
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST, read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import duration, listed
+from tetra_drake.files import write_whole
+from tetra_drake.formatting import duration
 from tetra_drake.lab.elites.elites import judge_elites
 from tetra_drake.machine import available_cores
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.yaml_text import parse_yaml
 
 HERE = Path(__file__).parent
 SCRATCH = Path("out/runs")
@@ -54,7 +53,6 @@ PICTURE, FILM = "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
 TIMES = "times.json"
-SO_FAR, EVOLUTION = "--so-far", "evolution"
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ _STEP = {"engine.max_step": "3 ms"}
 
 def load_experiments(file: Path) -> dict[str, Experiment]:
     """The experiments of a file by name of the folder, in the order of the gallery."""
-    content, experiments = parse_yaml(read_text(file, "experiments"), file), {}
+    content, experiments = read_settings(file), {}
     for name, given in content["experiments"].items():
         own = given.pop("changes", {})
         of_groups = [content["groups"][group] for group in given.pop("with", [])]
@@ -107,24 +105,23 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     if analysis.exists() and copy.exists() and filecmp.cmp(analysis, copy, shallow=False):
         return
     if not (made / MANIFEST).exists() and is_unfinished(shown, scenario):
-        thin(shown, made, whole=True)
+        shutil.copytree(shown, made, ignore=shutil.ignore_patterns(ANALYSIS), dirs_exist_ok=True)
     resume, progress = (made / MANIFEST).exists(), Progress(sys.stdout)
     if not resume:
         save_times(load_times(out) | {name: {}}, out)
-    with timed(name, EVOLUTION, out):
+    with timed(name, "evolution", out):
         # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
         evolve(scenario, made, resume=resume, reevaluate=False, report=False, progress=progress)
-    publish(name, experiment, made, out=out)
-
-
-def record_so_far(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> None:
-    """Puts what there is of a run in `scratch`, which another process may evolve, into `out`."""
-    with tempfile.TemporaryDirectory() as folder:
-        copy, times = Path(folder) / name, load_times(out)
-        thin(scratch / name, copy, whole=True)
-        evolution = {key: time for key, time in times.get(name, {}).items() if key == EVOLUTION}
-        save_times(times | {name: evolution}, out)
-        publish(name, experiment, copy, out=out, whole=True)
+    if not analysis.exists():
+        with timed(name, "analysis", out):
+            judge_elites(made)
+            analyse(made, workers=available_cores())
+    with timed(name, "pages", out):
+        for old in shown.glob("trial_*"):
+            shutil.rmtree(old)
+        thin(made, shown, initial=experiment.initial)
+        show(shown, film=experiment.film)
+    shutil.copy(analysis, copy)
 
 
 def is_unfinished(shown: Path, scenario: Scenario) -> bool:
@@ -133,30 +130,6 @@ def is_unfinished(shown: Path, scenario: Scenario) -> bool:
         return False
     manifest = read_manifest(shown)
     return not manifest.thinned and not manifest.scenario.differences(scenario)
-
-
-def publish(
-    name: str, experiment: Experiment, made: Path, *, out: Path, whole: bool = False
-) -> None:
-    """Analyses the run in the folder `made`, unless that is done, and shows it in `out`: thinned,
-    unless it is to be `whole`."""
-    analysis, shown = made / ANALYSIS, out / name
-    if not analysis.exists():
-        with timed(name, "analysis", out):
-            judge_elites(made)
-            analyse(made, workers=available_cores())
-    with timed(name, "pages", out):
-        make_folder(made, shown, initial=experiment.initial, whole=whole)
-        show(shown, film=experiment.film)
-    shutil.copy(analysis, shown / ANALYSIS)
-
-
-def make_folder(made: Path, shown: Path, *, initial: bool = False, whole: bool = False) -> None:
-    """Thins a run into the folder `shown`, in place of its old trials; or copies its record, if it
-    is to be `whole`."""
-    for old in shown.glob("trial_*"):
-        shutil.rmtree(old)
-    thin(made, shown, initial=initial, whole=whole)
 
 
 def load_times(out: Path) -> dict[str, Any]:
@@ -213,23 +186,11 @@ def take_pictures(page: Path, *pictures: Path) -> None:
     subprocess.run([sys.executable, script, page, *pictures], check=True)
 
 
-def chosen(names: Sequence[str]) -> Sequence[str]:
-    """The given names of experiments, or all. Raises InputError for an unknown name."""
-    if unknown := {*names} - {*EXPERIMENTS}:
-        problem = f"found {listed([*unknown])}, expected {listed([*EXPERIMENTS])}"
-        raise InputError("NAME", "", problem)
-    return names or [*EXPERIMENTS]
-
-
-def main(arguments: Sequence[str]) -> None:
+def main(names: Sequence[str]) -> None:
     """Records the experiments of the given names, or all. Raises InputError."""
-    make = record_so_far if SO_FAR in arguments else record
-    for name in chosen([argument for argument in arguments if argument != SO_FAR]):
-        make(name, EXPERIMENTS[name], scratch=SCRATCH, out=HERE)
+    for name in chosen(names, EXPERIMENTS):
+        record(name, EXPERIMENTS[name], scratch=SCRATCH, out=HERE)
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"record.py: {error}")
+    run_script(main)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,7 +13,9 @@ from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run
 from tetra_drake.experiment import evolve
 from tetra_drake.files import read_json, read_text
+from tetra_drake.formatting import listed
 from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.optimizers import MakeOptimizer
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import parse_yaml
 
@@ -35,6 +37,14 @@ def run_script(main: Callable[[Sequence[str]], None]) -> None:
         sys.exit(f"{name}: interrupted; the same command goes on")
 
 
+def chosen(names: Sequence[str], known: Iterable[str], what: str = "NAME") -> list[str]:
+    """The given names, or all known ones without any. Raises InputError for an unknown name."""
+    every = [*known]
+    if unknown := sorted({*names} - {*every}):
+        raise InputError(what, "", f"found {listed(unknown)}, expected {listed(every)}")
+    return [*names] or every
+
+
 def read_settings(file: Path) -> Any:
     """Content of a YAML file. Raises InputError if it cannot be read."""
     return parse_yaml(read_text(file, "settings"), file)
@@ -51,9 +61,15 @@ def read_record(path: Path, use: Callable[[Any], T], command: str) -> T:
         raise InputError(path, "", problem) from error
 
 
-def evolved(scenario: Scenario, folder: Path) -> Run:
-    """Run of a scenario in a folder, evolved as far as it is not yet."""
-    resume, progress = (folder / MANIFEST).exists(), Progress(sys.stdout)
+def evolved(scenario: Scenario, folder: Path, optimizer: MakeOptimizer | None = None) -> Run:
+    """Run of a scenario in a folder, evolved as far as it is not yet, by the scenario's optimiser
+    or another."""
     return evolve(
-        scenario, folder, resume=resume, reevaluate=False, report=False, progress=progress
+        scenario,
+        folder,
+        resume=(folder / MANIFEST).exists(),
+        optimizer=optimizer,
+        reevaluate=False,
+        report=False,
+        progress=Progress(sys.stdout),
     )

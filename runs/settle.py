@@ -1,22 +1,14 @@
-"""Comparison of the trials of two recorded runs, with confidence intervals.
-
-    python runs/settle.py runs/rough runs/rough-feedback
-
-Prints mean numbers of the trials' best gaits, from analysis.json, and the difference of the means
-with its 95 % confidence interval, by bootstrap over the trials.
-"""
+"""Comparison of the trials of two recorded runs: mean numbers of their best gaits, and differences
+of the means with 95 % confidence intervals, by bootstrap over the trials."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from analyse import Analysis, load_analysis
-from script import run_script
 
-from tetra_drake.errors import InputError
-from tetra_drake.formatting import TextTable, fixed, listed, ranged
+from tetra_drake.formatting import TextTable, fixed, ranged
 from tetra_drake.lab.study.statistics import interval_of_resamples, resampled
 from tetra_drake.settings.units import INCH
 
@@ -34,10 +26,9 @@ def numbers(analysis: Analysis) -> dict[str, np.ndarray]:
         unseen = unseen.assign(valid_in=unseen["distance_in"] * unseen["met"])
         walks = unseen.groupby("trial")[["distance_in", "met", "valid_in"]].mean()
         by_name["mean distance on unseen ground, in"] = walks["distance_in"].to_numpy()
-        by_name["share of these walks that meet the requirements, %"] = (
-            100.0 * walks["met"].to_numpy()
-        )
-        by_name["mean distance, 0 where they are not met, in"] = walks["valid_in"].to_numpy()
+        met, valid = 100.0 * walks["met"].to_numpy(), walks["valid_in"].to_numpy()
+        by_name["share of these walks that meet the requirements, %"] = met
+        by_name["mean distance, 0 where they are not met, in"] = valid
     return by_name
 
 
@@ -50,23 +41,10 @@ def difference_of_means(one: np.ndarray, other: np.ndarray) -> tuple[float, floa
 
 
 def settled(first: Path, second: Path) -> TextTable:
-    """Text with the comparison of two runs."""
+    """Table of the comparison of two runs."""
     one, other = (numbers(load_analysis(run)) for run in (first, second))
     rows = []
     for name in one:
-        if name not in other:
-            continue
         means = [fixed(values[name].mean()) for values in (one, other)]
         rows.append([name, *means, ranged(*difference_of_means(one[name], other[name]))])
     return TextTable(["mean of the trials", first.name, second.name, "difference"], rows)
-
-
-def main(runs: Sequence[str]) -> None:
-    """Compares two runs."""
-    if len(runs) != 2:
-        raise InputError("RUN RUN", "", f"found {listed(runs)}, expected two runs")
-    print(settled(Path(runs[0]), Path(runs[1])).markdown())
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -12,21 +12,22 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from script import run_script
 
 from tetra_drake.engines.simulate import simulate_many
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.files import write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.laws.phase import PhaseOscillators
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.scenario.scenario import Scenario
 
 HERE = Path(__file__).parent
 RECORD = HERE / "thesis" / "sine.json"
@@ -37,6 +38,8 @@ RUNS = [
 FREQUENCIES, LAGS = np.arange(0.3, 2.6, 0.2), np.arange(15.0, 151.0, 15.0)
 """Frequencies in Hz; lags in degrees, with which the wave runs from the rear to the front."""
 TRIED = FREQUENCIES.size * LAGS.size
+PERIOD = 0.01
+"""Time (s) between samples of signals."""
 
 
 def oscillators(amplitude: float, *, start_up: float = 1.25) -> PhaseOscillators:
@@ -59,17 +62,27 @@ def grid(space: ParameterSpace) -> list[Vector]:
     return vectors
 
 
-def peak(run: Run) -> float:
-    """Peak (N) of the signals of a run's best gait after the first 5 s."""
-    gait = run.best_gait()
-    times = np.arange(5.0, run.scenario.simulation.duration, 0.01)
-    signals = DrivenRobot.of(Robot.of(run.scenario), gait).signals_at(times)
-    return float(np.abs(signals).max())
+def steady_signals(robot: Robot, gait: Gait) -> np.ndarray:
+    """Signals (times, oscillators) in N of a gait after the first 5 s, every PERIOD."""
+    times = np.arange(5.0, robot.scenario.simulation.duration, PERIOD)
+    return DrivenRobot.of(robot, gait).signals_at(times)
+
+
+def peak(scenario: Scenario, gait: Gait) -> float:
+    """Peak (N) of the steady signals of a gait."""
+    return float(np.abs(steady_signals(Robot.of(scenario), gait)).max())
+
+
+def load_sines() -> dict[str, dict[str, float]]:
+    """The recorded sines by run. Raises InputError if the record cannot be read."""
+    sines: dict[str, dict[str, float]] = read_json(RECORD, "record; run `python runs/sine.py`")
+    return sines
 
 
 def farthest(run: Run) -> dict[str, float]:
     """Numbers of the sine that moves a run's robot farthest forward."""
-    amplitude, scenario = peak(run), run.scenario.on_engine("compiled")
+    amplitude = peak(run.scenario, run.best_gait())
+    scenario = run.scenario.on_engine("compiled")
     cpg = oscillators(amplitude, start_up=scenario.cpg.start_up)
     scenario = scenario.with_changes({"cpg": cpg})
     space = ParameterSpace.of(scenario)
@@ -91,7 +104,7 @@ def farthest(run: Run) -> dict[str, float]:
 
 def main(names: Sequence[str]) -> None:
     """Writes the record and prints it."""
-    found = json.loads(RECORD.read_text(encoding="utf-8"))
+    found = load_sines()
     for name in names or RUNS:
         found[name] = farthest(load_run(HERE / name))
         write_whole(RECORD, json.dumps(found, indent=1) + "\n")
@@ -99,7 +112,4 @@ def main(names: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        sys.exit(f"sine.py: {error}")
+    run_script(main)

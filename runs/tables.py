@@ -4,14 +4,13 @@
 
 Each table is in a Markdown file between two lines:
 
-    <!-- table NAME: made by runs/tables.py -->
-    <!-- end -->
+    <!--tables.py:NAME-->
+    <!--end-->
 """
 
 from __future__ import annotations
 
 import functools
-import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -25,10 +24,10 @@ from page import rendered
 from parting import partings
 from PIL import Image
 from readings import RECORD, load_record
-from record import DIAGRAM, EXPERIMENTS, PICTURE, load_times
+from record import EXPERIMENTS, PICTURE
 from script import run_script
-from sine import RECORD as SINES
-from sine import TRIED
+from settle import settled
+from sine import TRIED, load_sines
 
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
@@ -53,12 +52,13 @@ HEIGHT = 96
 
 ENGINES = ("compiled", "diagram", "MuJoCo")
 
+OTHERS = {"undulation": "undulation-four", "rough-feedback": "rough"}
+"""Runs with which others are compared on their pages."""
+
 FAR = 5.0
 """Distance (in) from which a gait walks; of less, a difference in percent says little."""
 
-_TABLE = re.compile(
-    r"(?P<begin><!-- table (?P<name>\S+): made by runs/tables.py -->)\n.*?<!-- end -->", re.DOTALL
-)
+_TABLE = re.compile(r"(?P<begin><!--tables.py:(?P<name>\S+)-->)\n.*?<!--end-->", re.DOTALL)
 
 
 Runs = Mapping[str, Analysis]
@@ -99,8 +99,6 @@ class Best:
     """The best gait of a run for the gallery."""
 
     title: str
-    diagram: str
-    """File of the picture beside PICTURE."""
     reached: Mapping[str, float]
     """Distances (m) by ENGINES, or angles (rad) if the objective is about turning; NaN if not
     simulated."""
@@ -156,16 +154,10 @@ def best_gait(name: str, run: Analysis) -> Best:
     # MuJoCo has Coulomb friction; under another law its distance is not one of this gait.
     alike = reached if isinstance(scenario.friction, Coulomb) else reached[:2]
     known = [*alike, reached[0] - changed, reached[0] + changed, *draws[list(DRAWN)]]
-    return Best(
-        title,
-        f"{DIAGRAM}.svg",
-        by_engine,
-        kept,
-        scenario.units,
-        turns,
-        relative_speed=math.nan if turns else gait[SPEED],
-        known=(math.nan, math.nan) if turns else (np.nanmin(known), np.nanmax(known)),
-    )
+    if turns:
+        return Best(title, by_engine, kept, scenario.units, turns)
+    ends = np.nanmin(known), np.nanmax(known)
+    return Best(title, by_engine, kept, scenario.units, turns, gait[SPEED], ends)
 
 
 def distances_of(run: Analysis, trial: int) -> np.ndarray:
@@ -176,13 +168,9 @@ def distances_of(run: Analysis, trial: int) -> np.ndarray:
 
 
 def gallery_table(runs: Runs) -> str:
-    """Table of all runs with what their best gaits reach, and the work of two cores."""
-    minutes = {
-        name: sum(stage["cores_s"] for stage in stages.values()) / (2 * 60)
-        for name, stages in load_times(HERE).items()
-    }
+    """Table of all runs with what their best gaits reach."""
     bests, files = best_of_all(runs), {"README": README, "PICTURE": PICTURE, "shown": shown}
-    return rendered("gallery.md", bests=bests, minutes=minutes, **files)
+    return rendered("gallery.md", bests=bests, **files)
 
 
 def differences(runs: Runs) -> pandas.DataFrame:
@@ -198,17 +186,12 @@ def differences(runs: Runs) -> pandas.DataFrame:
             continue
         for trial, gait in run.best_gaits.iterrows():
             compiled, diagram, mujoco = distances_of(run, trial) / INCH
-            rows.append(
-                {
-                    "run": name,
-                    "trial": trial,
-                    "coulomb": isinstance(scenario_of(name).friction, Coulomb),
-                    "diagram": abs(diagram - compiled),
-                    "mujoco": abs(mujoco / compiled - 1.0) if abs(compiled) >= FAR else math.nan,
-                    "nanometre": gait["sensitivity_in"],
-                }
-            )
-    return pandas.DataFrame(rows)
+            share = abs(mujoco / compiled - 1.0) if abs(compiled) >= FAR else math.nan
+            coulomb = isinstance(scenario_of(name).friction, Coulomb)
+            apart = abs(diagram - compiled), share, gait["sensitivity_in"]
+            rows.append([name, trial, coulomb, *apart])
+    columns = ["run", "trial", "coulomb", "diagram", "mujoco", "nanometre"]
+    return pandas.DataFrame(rows, columns=columns)
 
 
 def trust_table(runs: Runs) -> str:
@@ -228,22 +211,18 @@ def results_table(runs: Runs) -> str:
 
 
 def trials_table(name: str, runs: Runs) -> str:
-    """Table of the fittest gait of each trial of a run, on all engines and on disturbed robots.
-    Below it, the trials with different distances on the engines, and the farthest sine."""
+    """List of the fittest gaits of the trials of a run, on two engines and on disturbed robots.
+    Below it, the trials with another distance on the diagram, and the farthest sine."""
     run, units, rows = runs[name], scenario_of(name).units, []
-    for trial, gait in run.best_gaits.iterrows():
-        judged, (compiled, diagram, mujoco) = run.disturbed.loc[trial], distances_of(run, trial)
-        row = {
-            "trial": trial,
-            "distances": np.array([compiled, diagram, mujoco]) / units.length,
-            "kept": 100.0 * judged[["kept", "kept_low", "kept_high"]].to_numpy(),
-            "cost": gait["cost_of_transport"],
-            "is_apart": not abs(compiled - diagram) <= APART,
-        }
-        rows.append(row)
-    apart_by = f"{rounded(APART / units.length, 1)} {units.length_word}"
-    sine = json.loads(read_text(SINES, "record")).get(name)
-    return rendered("trials.md", rows=rows, units=units, apart_by=apart_by, sine=sine, tried=TRIED)
+    for trial in run.best_gaits.index:
+        compiled, diagram, mujoco = distances_of(run, trial) / units.length
+        row = {"trial": trial, "compiled": compiled, "diagram": diagram, "mujoco": mujoco}
+        row["kept"] = 100.0 * run.disturbed.loc[trial, "kept"]
+        rows.append(row | {"is_apart": not abs(compiled - diagram) <= APART / units.length})
+    numbers = {"rows": rows, "units": units, "sine": load_sines().get(name), "tried": TRIED}
+    numbers["apart_by"] = f"{rounded(APART / units.length, 1)} {units.length_word}"
+    numbers["on_mujoco"] = bool(np.isfinite([row["mujoco"] for row in rows]).any())
+    return rendered("trials.md", **numbers)
 
 
 def partings_table(name: str, other: str) -> str:
@@ -260,15 +239,18 @@ def pages(runs: Runs) -> list[Path]:
 def made_again(page: Path, runs: Runs) -> str:
     """Text of a page with new tables. Raises InputError if the page cannot be read."""
 
-    def make_table(name: str) -> str:
+    name = page.parent.name
+
+    def make_table(table: str) -> str:
         tables = {
             "results": lambda: results_table(runs),
             "gallery": lambda: gallery_table(runs),
             "trust": lambda: trust_table(runs),
-            "trials": lambda: trials_table(page.parent.name, runs),
-            "partings": lambda: partings_table(page.parent.name, "thesis"),
+            "trials": lambda: trials_table(name, runs),
+            "settled": lambda: settled(HERE / OTHERS[name], HERE / name).markdown(),
+            "partings": lambda: partings_table(name, "thesis"),
         }
-        return tables[name]()
+        return tables[table]()
 
     return filled(read_text(page, "page"), make_table)
 
@@ -280,12 +262,12 @@ def filled(text: str, make_table: Callable[[str], str]) -> str:
     """
 
     def remade(match: re.Match[str]) -> str:
-        if match[0].count("<!-- table ") > 1:
+        if match[0].count("<!--tables.py:") > 1:
             raise ValueError(f"table {match['name']} has no end before the next one")
-        return f"{match['begin']}\n\n{make_table(match['name']).rstrip()}\n\n<!-- end -->"
+        return f"{match['begin']}\n\n{make_table(match['name']).rstrip()}\n\n<!--end-->"
 
     text, tables = _TABLE.subn(remade, text)
-    if tables < text.count("<!-- table "):
+    if tables < text.count("<!--tables.py:"):
         raise ValueError("the last table has no end")
     return text
 

@@ -24,7 +24,7 @@ from page import rendered
 from record import load_times
 from script import read_record, run_script
 from settle import difference_of_means, numbers
-from sine import TRIED
+from sine import TRIED, load_sines
 from tables import aspect, best_gait
 from thesis_figures import save_figures
 
@@ -42,7 +42,6 @@ from tetra_drake.settings.units import INCH, POUND_FORCE, plainest
 HERE = Path(__file__).parent
 PAGE, FIGURES = HERE / "thesis/THESIS.md", HERE / "thesis/redrawn"
 NUMBERS = HERE / "thesis/simulated.json"
-SINES = HERE / "thesis/sine.json"
 FORMER = HERE / "thesis-reversal"
 
 sys.path.append(str(HERE.parent / "diagrams"))
@@ -61,11 +60,11 @@ DRAWS = 2000
 
 
 def setting(label: str, given: Any, key: str) -> str:
-    """Row of a table of settings: the thesis's value, our key, our value, and if they agree."""
+    """Item of a list of settings: the thesis's value, and our key; our value if it differs."""
     scenario = load_scenario("thesis")
     ours = flattened(written(scenario.model_dump(), plainest))[key]
     same = scenario.with_changes({key: given}).values()[key] == scenario.values()[key]
-    return f"| {label} | {given} | `{key}` | {ours} | {'yes' if same else '**no**'} |"
+    return f"- {label}: {given}, `{key}`{'' if same else f', **not** {ours}'}"
 
 
 def over_trials(values: pandas.Series, digits: int = 2) -> str:
@@ -175,10 +174,8 @@ def motion_errors(run: Run, engines: Iterable[str]) -> list[str]:
     """Greatest error (in) of a node's place on each engine beside a fine one, over the best gaits
     of a run."""
     exact, *others = (motions(run, engine) for engine in (FINE, *engines))
-    errors = [
-        [float(abs(a - b).max()) / INCH for a, b in zip(each, exact, strict=True)]
-        for each in others
-    ]
+    pairs = [zip(each, exact, strict=True) for each in others]
+    errors = [[float(abs(a - b).max()) / INCH for a, b in each] for each in pairs]
     return [over_trials(pandas.Series(each)) for each in errors]
 
 
@@ -219,7 +216,7 @@ def simulated_numbers(run: Run) -> dict[str, Any]:
 
 def page(run: Run, simulated: Mapping[str, Any]) -> str:
     """Text of the page, with simulated_numbers()."""
-    sines = read_json(SINES, "record; run `python runs/sine.py`")
+    sines = load_sines()
     tables = readings.tables_of(readings.load_record(readings.RECORD))
     return rendered(
         "thesis.md",

@@ -54,27 +54,24 @@ _DOWN = decimal.Context(prec=6, rounding=decimal.ROUND_FLOOR)
 """Digits of the fitness of an evaluation without genome. With fewer, it could become a new best."""
 
 
-def thin(source: Path, out: Path, *, initial: bool = False, whole: bool = False) -> None:
-    """Writes a thinned copy of a run to the folder `out`; or with `whole` a compressed copy that
-    lacks nothing of finished iterations, from which the run can go on. Raises InputError if a file
-    cannot be read or written."""
+def thin(source: Path, out: Path, *, initial: bool = False) -> None:
+    """Writes a thinned copy of a run to the folder `out`. Raises InputError if a file cannot be
+    read or written."""
     run = load_run(source)
-    manifest = json.loads((source / MANIFEST).read_text(encoding="utf-8")) | {"thinned": not whole}
+    manifest = json.loads((source / MANIFEST).read_text(encoding="utf-8")) | {"thinned": True}
     matter = _that_matter(run, initial)
     rises, metrics = _keys(_rises(run.evaluations)), _that_choose(run.scenario)
     for trial in range(run.scenario.evolution.trials):
-        iterations = _entries(run, ITERATIONS, trial)  # read first: a run may grow meanwhile
         thinned = []
         for entry in _entries(run, EVALUATIONS, trial):
             key = trial, entry["index"]
             reduced = _kept(entry, metrics) if key in matter else _thinned(entry, metrics)
             reduced |= {"fitness": entry["fitness"]} if key in rises else {}
-            kept = entry if whole else reduced
-            wall_time = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
-            thinned.append(kept | {"wall_time_s": wall_time})
+            reduced["wall_time_s"] = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
+            thinned.append(reduced)
         again = [e | {"genome": None} for e in _entries(run, REEVALUATIONS, trial)]
         _write(run, out, EVALUATIONS, thinned, trial=trial)
-        _write(run, out, ITERATIONS, iterations, trial=trial)
+        _write(run, out, ITERATIONS, _entries(run, ITERATIONS, trial), trial=trial)
         _write(run, out, REEVALUATIONS, again, trial=trial)
         for name in (BEST_GAIT, BEST_SCENARIO):
             best = trial_folder(source, trial) / name
@@ -148,12 +145,7 @@ def _rounded(value: Any, digits: int) -> Any:
 
 
 def _write(
-    run: Run,
-    out: Path,
-    name: str,
-    entries: Sequence[Mapping[str, Any]],
-    *,
-    trial: int | None = None,
+    run: Run, out: Path, name: str, entries: Sequence[Mapping[str, Any]], trial: int | None = None
 ) -> None:
     """Writes lines of a run to the folder `out`, compressed. Writes no file without lines."""
     file = RecordFile.of(out, run.manifest.run, name, trial=trial)

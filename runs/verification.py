@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,10 +19,12 @@ import numpy as np
 import verification_references as references
 import yaml
 from page import rendered
+from pydrake.multibody.tree import RotationalInertia
+from script import run_script
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import read_text, write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.laws.cable import CableLaw, elastic_energy
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.results.result import SimulationResult
@@ -117,10 +118,10 @@ def energy_of(result: SimulationResult) -> tuple[Array, Array]:
         for time, (p, v) in enumerate(zip(p_WN[:, first:end], v_WN[:, first:end], strict=True)):
             rigid = rigid_motions(p - p_WB[time, body]).reshape(-1, 6)
             w, speed = np.split(np.linalg.lstsq(rigid, v.ravel(), rcond=1e-9)[0], 2)
-            xx, yy, zz, xy, xz, yz = structure.unit_inertia[body]
             turn = references.Rotation.from_quat(q[time, [1, 2, 3, 0]])
             own = turn.inv().apply(w)
-            spin = own @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ own
+            unit = RotationalInertia(*structure.unit_inertia[body]).CopyToFullMatrix3()
+            spin = own @ unit @ own
             motion[time] += 0.5 * structure.mass[body] * (speed @ speed + spin)
     return energy + motion, motion
 
@@ -131,6 +132,9 @@ def followed(problem: Mapping[str, Any], result: SimulationResult) -> Array:
     if what == "energy":
         energy, motion = energy_of(result)
         return 1.0 + (energy - energy[0]) / motion[0]
+    if what == "centre":
+        mass = result.robot.structure.mass
+        return np.asarray(seen.p_WB.values[..., 2] @ mass / mass.sum())
     if what == "rebound":
         speeds = seen.v_WN.sel(node="a", axis="z").values
         return -speeds / speeds[0]
@@ -178,7 +182,7 @@ def order_of(problem: Mapping[str, Any], name: str) -> float | None:
     return math.log2(coarse / fine)
 
 
-def verified(name: str, engines: Mapping[str, tuple[str, str]] = ENGINES) -> dict[str, Any]:
+def verified(name: str) -> dict[str, Any]:
     """Results of a problem: curves, and for each engine the greatest errors."""
     problem = completed(name)
     if problem.get("follow") == "rest":
@@ -188,21 +192,23 @@ def verified(name: str, engines: Mapping[str, tuple[str, str]] = ENGINES) -> dic
         return own | {"engines": {"all": {"error": error}}}
     results: dict[str, Any] = {"engines": {}}
     is_smooth = problem.get("order") is not None
-    for engine, (default, fine) in engines.items():
+    for engine, (default, fine) in ENGINES.items():
         if engine in problem.get("lacks", {}):
             continue
-        try:
-            usual = run(problem, default, drift=is_smooth)
-            close = None if problem.get("long") else run(problem, fine, drift=is_smooth)
-            order = order_of(problem, engine)
-        except (SimulationFailure, InputError) as failure:
-            results["engines"][engine] = {"failure": str(failure).splitlines()[0]}
-            continue
-        size = float(np.ptp(usual["expected"])) or 1.0
-        results |= {"x": usual["x"].tolist(), "expected": usual["expected"].tolist(), "size": size}
-        results[engine] = usual["found"].tolist()
-        results["engines"][engine] = numbers_of(usual, size, "") | {"order": order}
-        results["engines"][engine] |= numbers_of(close, size, "fine_") if close else {}
+        finest = problem.get("fine", {}).get(engine, "" if problem.get("long") else fine)
+        numbers: dict[str, Any] = {"order": order_of(problem, engine)}
+        results["engines"][engine] = numbers
+        for prefix, settings in (("", default), ("fine_", finest)):
+            try:
+                found = run(problem, settings, drift=is_smooth) if settings else None
+            except (SimulationFailure, InputError) as failure:
+                numbers[f"{prefix}failure"] = str(failure).splitlines()[0]
+                continue
+            if found:
+                size = float(np.ptp(found["expected"])) or 1.0
+                results |= {k: found[k].tolist() for k in ("x", "expected")} | {"size": size}
+                results.setdefault(engine, found["found"].tolist())
+                numbers |= numbers_of(found, size, prefix)
     return results
 
 
@@ -217,6 +223,8 @@ def completed(name: str) -> dict[str, Any]:
     problem: dict[str, Any] = {"name": name} | PROBLEMS[name]
     if "beads" in problem:
         problem["tree"] = references.beads_tree(name, problem["beads"])
+    elif "rim" in problem:
+        problem["tree"] = references.disk_tree(problem["rim"])
     elif "grid" in problem:
         problem["tree"] = references.four_bar_tree(problem["grid"])
         problem["name"] = "four_bar"
@@ -281,10 +289,10 @@ def main(names: Sequence[str]) -> None:
         results[name] = {"size": found.get("size", 1.0), "engines": found["engines"]}
         print(name, results[name], flush=True)
     if names and file.exists():
-        results = json.loads(read_text(file, "results")) | results
+        results = read_json(file, "results") | results
     write_whole(file, json.dumps(results, indent=1) + "\n")
     write_page(results)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    run_script(main)

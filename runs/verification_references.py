@@ -12,10 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from pydrake.multibody.tree import RotationalInertia
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
@@ -89,39 +90,30 @@ AXES = np.cross(POINTS - np.roll(POINTS, 1, axis=0), np.roll(POINTS, -1, axis=0)
 
 
 def bricard(times: Array, case: Case) -> Array:
-    def places(angles: Array) -> tuple[Array, list[Rotation]]:
-        turn, points, turns = Rotation.identity(), [POINTS[0]], []
-        for i in range(5):
-            turn = turn * Rotation.from_rotvec(angles[i] * AXES[i])
-            turns.append(turn)
-            points.append(points[-1] + turn.apply(POINTS[i + 1] - POINTS[i]))
-        return np.array(points), turns
-
-    def gap(others: Array, first: float) -> Array:
-        points, turns = places(np.array([first, *others]))
-        return np.append(points[5] - POINTS[5], turns[4].apply(AXES[5]) - AXES[5])
-
-    grid, angles = np.arange(-1.2, 1.2001, 0.01), []
-    for side in (grid[grid <= 1e-9][::-1], grid[grid > 1e-9]):
-        known = np.zeros(4)
-        found = []
-        for first in side:
-            known = least_squares(gap, known, args=(first,), xtol=1e-14, ftol=1e-14, gtol=1e-14).x
-            found.append([first, *known])
-        angles += found[::-1] if side[0] < 0.005 else found
-    points = np.array([places(np.array(each))[0] for each in angles])
-    path = CubicSpline(grid, points)
-    inertia, height = np.zeros_like(grid), np.zeros_like(grid)
-    for i in range(5):  # of a rod: m (a a + a b + b b) / 3
-        a, b = path(grid, 1)[:, i], path(grid, 1)[:, i + 1]
-        inertia += ((a * a + a * b + b * b).sum(axis=1)) / 3.0
-        height += 0.5 * (points[:, i, 2] + points[:, i + 1, 2])
-    mass, level = CubicSpline(grid, inertia), CubicSpline(grid, height)
+    phase = np.linspace(0.0, 2.0 * math.pi, 1201)
+    a = 2.0 * np.arctan(math.sqrt(3.0) * np.cos(phase))
+    b = 2.0 * np.arcsin(math.sqrt(0.75) * np.sin(phase))
+    turn, points = Rotation.identity(), [np.zeros((len(phase), 3))]
+    for i in range(5):
+        angle = (b if i % 2 else a) - 0.5 * math.pi
+        turn = turn * Rotation.from_rotvec(angle[:, np.newaxis] * AXES[i])
+        points.append(points[-1] + turn.apply(POINTS[i + 1] - POINTS[i]))
+    path = CubicSpline(phase, np.stack(points, axis=1), bc_type="periodic")
+    ways, places = path(phase, 1), path(phase)
+    near, far = ways[:, :-1], ways[:, 1:]  # ends of rods, whose mass is m (a a + a b + b b) / 3
+    mass, level = (
+        CubicSpline(phase, values, bc_type="periodic")
+        for values in (
+            (near * near + near * far + far * far).sum(axis=(1, 2)) / 3.0,
+            0.5 * (places[:, :-1, 2] + places[:, 1:, 2]).sum(axis=1),
+        )
+    )
 
     def rate(_: float, y: Array) -> list[float]:
         return [y[1], (-0.5 * mass(y[0], 1) * y[1] ** 2 - G * level(y[0], 1)) / mass(y[0])]
 
-    return path(solved(rate, [0.0, 0.0], times, rtol=1e-9, atol=1e-10)[0])[:, 3, 0]
+    start = [math.acos(1.0 / math.sqrt(3.0)), 0.0]
+    return path(solved(rate, start, times, rtol=1e-9, atol=1e-10)[0])[:, 3, 0]
 
 
 def turning(inertia: Array, spin: Array, arm: Array, times: Array) -> Array:
@@ -152,6 +144,12 @@ def projectile(times: Array, case: Case) -> Array:
     return 1.0 + 4.0 * times - 0.5 * G * times**2
 
 
+def throw(times: Array, case: Case) -> Array:
+    structure = case["robot"].structure
+    height = structure.mass @ structure.p_WB[:, 2] / structure.mass.sum()
+    return height - 1.0 + projectile(times, case)
+
+
 def double_pendulum(times: Array, case: Case) -> Array:
     lengths, radius = np.array([0.4, 0.3]), 0.004
     m, n = masses = 1200.0 * math.pi * radius**2 * lengths
@@ -172,6 +170,16 @@ def double_pendulum(times: Array, case: Case) -> Array:
     return 0.4 * np.sin(a) + 0.3 * np.sin(b)
 
 
+def snap(times: Array, case: Case) -> Array:
+    inertia, first = 0.25 + 1.0 / 12.0 + 0.25 * 0.004**2, math.pi / 6
+
+    def rate(_: float, y: Array) -> list[float]:
+        taut = max(0.0, math.cos(y[0]) - math.cos(first))
+        return [y[1], (160.0 * taut * math.sin(y[0]) - 0.5 * G * math.cos(y[0])) / inertia]
+
+    return np.sin(solved(rate, [first, 0.0], times)[0])
+
+
 def precession(times: Array, case: Case) -> Array:
     structure = case["robot"].structure
     arms = structure.p_WB - structure.mass @ structure.p_WB / structure.mass.sum()
@@ -179,9 +187,8 @@ def precession(times: Array, case: Case) -> Array:
     for mass, unit, q, arm in zip(
         structure.mass, structure.unit_inertia, structure.q_WB, arms, strict=True
     ):
-        xx, yy, zz, xy, xz, yz = mass * unit
         turn = Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix()
-        inertia += turn @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ turn.T
+        inertia += turn @ RotationalInertia(*(mass * unit)).CopyToFullMatrix3() @ turn.T
         inertia += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     first = case["first"]
     centre = structure.mass @ structure.p_WB / structure.mass.sum()
@@ -203,6 +210,37 @@ def hoop(times: Array, case: Case) -> Array:
     rolls = 0.0 if "friction.static" in case else number(case["robot.bodies.one.inertia"][0])
     way = 0.5 * G * math.sin(slope) / (1.0 + rolls / (0.5 * 0.05**2)) * times**2
     return -0.05 * math.sin(slope) - math.cos(slope) * way
+
+
+def disk_tree(count: int) -> dict[str, Any]:
+    """A disk of 0.1 m and 0.1 kg, tilted by 45 degrees, as a ring of nodes."""
+    angles = 2.0 * np.pi * np.arange(count) / count - 0.5 * np.pi
+    nodes = {f"r{i}": [0.1 * math.cos(a), 0.1 * math.sin(a), 0] for i, a in enumerate(angles)}
+    spin = DISK_RATE * math.sin(math.pi / 4) ** 2
+    moments = ["2.5e-4 kg*m^2", "2.5e-4 kg*m^2", "5e-4 kg*m^2"]
+    body = {"nodes": [*nodes], "mass": "0.1 kg", "centre": [0, 0, 0], "inertia": moments}
+    return {
+        "unit": "m",
+        "nodes": nodes | {"w": [0, 9, 0]},
+        "bodies": {"disk": body},
+        "cables": {"cord": CORD | {"pairs": [["r0", "w"]]}},
+        "anchors": {"w": "xyz"},
+        "contacts": [*nodes],
+        "start": {
+            "rest": False,
+            "turned": {"roll": "45 deg"},
+            "spin": [0, f"{spin} rad/s", f"{spin} rad/s"],
+        },
+    }
+
+
+DISK_RATE = math.sqrt(4.0 * G / (0.1 * math.sin(math.pi / 4)))
+"""Rate (rad/s) at which a tilted disk rolls on around its resting centre."""
+
+
+def disk(times: Array, case: Case) -> Array:
+    rolled = DISK_RATE * math.cos(math.pi / 4) * times
+    return 0.1 * math.sin(math.pi / 4) * (1.0 - np.cos(rolled))
 
 
 def ramp(times: Array, case: Case) -> Array:
@@ -436,12 +474,12 @@ def rope_modes() -> tuple[Array, Array, Array]:
 
 
 def rings() -> tuple[Array, Array, Array]:
-    tau, fatigue, beta, found, expected = 0.05, 0.6, 2.5, [], []
-    for count in (2, 3, 5):
+    tau, fatigue, beta, found = 0.1, 0.6, 2.5, []
+    for count, weight in ((2, 1.0 + tau / fatigue), (3, 2.5), (5, 2.5)):
         weights = np.zeros((count + count % 2,) * 2)
         for i in range(count):
-            weights[i, (i - 1) % count] = 2.5
-        start = np.append(0.1 * np.arange(len(weights)), 0.0 * weights[0])
+            weights[i, (i - 1) % count] = weight
+        start = np.append(0.3 + 0.01 * np.arange(len(weights)), np.full(len(weights), 0.3))
         network = Network.of(weights, tau_a=tau, tau_b=fatigue, self_inhibition_weight=beta)
         neurons = MatsuokaCpg(network, tonic=1.0, initial_state=start, gain=1.0)
         simulator = Simulator(neurons)
@@ -450,15 +488,9 @@ def rings() -> tuple[Array, Array, Array]:
         for time in times.tolist():
             simulator.AdvanceTo(time)
             states.append(simulator.get_context().get_continuous_state_vector().CopyToVector()[0])
-
-        def rate(_: float, y: Array, weights: Array = weights) -> Array:
-            u, v = y.reshape(2, -1)
-            y = np.maximum(u, 0.0)
-            return np.append((1.0 - u - beta * v - weights @ y) / tau, (y - v) / fatigue)
-
         found.append(period(times, np.array(states)))
-        expected.append(period(times, solved(rate, start, times, max_step=1e-2)[0]))
-    return np.array([2, 3, 5]), np.array(found), np.array(expected)
+    pair = 2.0 * math.pi * math.sqrt(tau * fatigue / (beta - tau / fatigue))
+    return np.array([2, 3, 5]), np.array(found), np.array([pair, 0.3271, 0.6405])
 
 
 def period(times: Array, values: Array) -> float:

@@ -98,8 +98,8 @@ def test_a_failure_among_many_says_of_which_gait_and_scenario() -> None:
 def test_a_run_stands_for_its_scenario_and_its_best_gait():
     run = td.load_run("runs/demo")
     result = td.simulate(run.scenario, run.best_gait())
-    assert td.simulate("runs/demo", "runs/demo").metrics == result.metrics
-    assert td.simulate(run, run).metrics == td.simulate(result, run).metrics == result.metrics
+    assert td.simulate("runs/demo").metrics == result.metrics
+    assert td.simulate(run).metrics == td.simulate(result, run).metrics == result.metrics
 
 
 @pytest.mark.parametrize("name", [n for n in td.__all__ if inspect.isfunction(getattr(td, n))])

@@ -99,13 +99,11 @@ def scaled(factor):
     return objective
 
 
-@pytest.mark.parametrize(
-    ("objective", "others", "fact"),
-    [
-        (Heaviest(2.0), (None, Heaviest(3.0)), "Heaviest"),
-        (scaled(2.0), (scaled(3.0), scaled(-2.0)), "evaluation 0"),
-    ],
-)
+METHODS = [(Heaviest(2.0), (None, Heaviest(3.0)), "Heaviest")]
+METHODS += [(scaled(2.0), (scaled(3.0), scaled(-2.0)), "evaluation 0")]
+
+
+@pytest.mark.parametrize(("objective", "others", "fact"), METHODS)
 def test_a_run_is_resumed_only_by_its_own_method(
     tiny, tmp_path, refused, capsys, interrupting, objective, others, fact
 ):

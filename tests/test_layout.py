@@ -73,11 +73,17 @@ def test_data_flows_one_way() -> None:
         assert not upward, f"{name} imports {upward}"
 
 
-def test_a_simulation_loads_nothing_of_the_lab() -> None:
-    lines = ["import sys, tetra_drake as td", "td.simulate, td.evolve", "print(*sys.modules)"]
-    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
-    assert "tetra_drake.engines.simulate" in done.stdout.split()
-    assert not [name for name in done.stdout.split() if name.startswith("tetra_drake.lab")]
+def test_a_diagram_loads_the_model_and_a_simulation_nothing_of_the_lab() -> None:
+    show = "print(*(name for name in sys.modules if name.startswith('tetra_drake.')))"
+    diagram, simulation = "import tetra_drake.systems.diagram", "td.simulate, td.evolve"
+    code = "\n".join(["import sys, tetra_drake as td", diagram, show, simulation, show])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    of_diagram, of_simulation = map(str.split, done.stdout.splitlines())
+    assert "tetra_drake.systems.diagram" in of_diagram
+    assert len(of_diagram) <= 64  # 60 and the empty ones of the folders
+    assert "tetra_drake.robot.equilibrium" not in of_diagram
+    assert "tetra_drake.engines.simulate" in of_simulation
+    assert not [name for name in of_simulation if name.startswith("tetra_drake.lab")]
 
 
 def test_the_drawing_of_the_house_has_all_folders_in_their_order() -> None:

@@ -8,6 +8,7 @@ import copy
 import dataclasses
 import functools
 import io
+import json
 import math
 import os
 import random
@@ -43,36 +44,11 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 INPUTS, SEED, LONGEST = int(os.environ.get("INPUTS", "600")), int(os.environ.get("SEED", "0")), 20.0
 PRISM = td.load_scenario("prism").with_changes(BRIEF | {"engine": "!Compiled"})
 TREE = yaml.safe_load((Path(td.__file__).parent / "scenario/structures/prism.yaml").read_text())
-PLAIN = [
-    None,
-    True,
-    -1,
-    0,
-    2,
-    3.5,
-    math.nan,
-    math.inf,
-    1e300,
-    "",
-    "x",
-    "1 m",
-    "-3 N",
-    [],
-    {},
-    [1, 2],
-]
+PLAIN = [None, True, -1, 0, 2, 3.5, math.nan, math.inf, 1e300]
+PLAIN += ["", "x", "1 m", "-3 N", [], {}, [1, 2]]
 ODD = [*PLAIN, b"x", object(), np.zeros(3), np.full((6, 6), np.nan), {"a": 1}, [[math.nan] * 6]]
-ODD += [
-    lambda *_: None,
-    Path("/dev/zero"),
-    10**400,
-    (1, "a"),
-    Exception,
-    PRISM,
-    "--",
-    "<x/>",
-    "\x1b",
-]
+ODD += [lambda *_: None, Path("/dev/zero"), 10**400, (1, "a"), Exception, PRISM]
+ODD += ["--", "<x/>", "\x1b"]
 
 
 class Answers(ThreadPoolExecutor):
@@ -245,8 +221,51 @@ def played(rng, folder):
     env.step(rng.choice([env.action_space.sample(), *ODD]))
 
 
+SPRINGS = yaml.safe_load(
+    """
+coil: {pairs: [[n0, n1]], stiffness: 60 N/m, damping: 1 N*s/m, free_length: 0.1 m,
+  initial_tension: 1 N, quadratic: 9 N/m^2, cubic: 1 N/m^3, max_stretch: 0.1 m,
+  factors: {damping: [2]}}
+table: {pairs: [[n1, n4, n2]], damping: 1 N*s/m, tension: 1 N, mu: 0.3, max_tension: 9 N,
+  curve: {stretch: [0.1 m, 0.2 m], force: [1 N, 2 N]}}
+string: {pairs: [[n2, n3, n0]], string: true, free_length: 0.3 m, mu: 0.1}
+"""
+)
+ERRORS = {name: {"lengths": "1 mm", "q_WB": "1 deg"} for name in ("noise", "bias", "resolution")}
+ERRORS |= {"delay": {"rates": "100 ms", "tensions": "0 s"}, "seed": 3}
+
+
+def sprung(rng, folder):
+    cables = TREE["cables"] | mutated(rng, SPRINGS)
+    text = yaml.dump(TREE | {"cables": cables})
+    (folder / "a.yaml").write_text(text, "utf-8")
+    file = garbled(rng, folder, ".yaml", text) if rng.random() < 0.3 else folder / "a.yaml"
+    return Robot.of(PRISM.with_sections(robot=read_structure(file))).equilibrium
+
+
+def sensed(rng, folder):
+    scenario = PRISM.with_file({"sensing": mutated(rng, ERRORS)}, "a")
+    return td.Simulation(scenario, count=1).step(np.zeros((1, 6)))
+
+
 SPREAD = {"disturbances": {"draws": 2, "spreads": {"ground.stiffness": 0.1}}}
+WAVES = "gain: 2 N, frequency: [0.3 Hz, 1 Hz], coupling: [0, 5 1/s], start_up: 0 s, common: [lag]"
+
+
+def waving(rng, folder):
+    tree = mutated(rng, yaml.safe_load(f"{{{WAVES}, feedback: [length], lag: [-90 deg, 1 rad]}}"))
+    waves = PRISM.with_changes({"cpg": "!Phase " + yaml.safe_dump(tree, default_flow_style=True)})
+    td.simulate(waves, td.seeded_gait(waves, 1))
+
+
+def read(rng, folder):
+    (file := folder / "gait.json").write_text(json.dumps(mutated(rng, made()[5].to_json(PRISM))))
+    td.simulate(PRISM, td.load_gait(file, PRISM))
+
+
 SURFACES = {
+    "oscillators": waving,
+    "gait files": read,
     "structures": lambda r, f: read_structure(garbled(r, f, ".yaml", yaml.dump(mutated(r, TREE)))),
     "scenarios": lambda r, f: PRISM.with_file(
         mutated(r, {"simulation": {}, "cpg": {}} | SPREAD), "a"
@@ -283,6 +302,8 @@ SURFACES = {
     "bench": entered,
     "Simulation": stepped,
     "gym": played,
+    "springs": sprung,
+    "sensing": sensed,
 }
 
 

@@ -134,22 +134,9 @@ def test_the_front_page_is_short() -> None:
     assert len(README.split("## Install and run")[0].split()) <= 300
 
 
-def run_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Makes pyribs run in Python what it would compile for seconds."""
-    from ribs.emitters.opt import CMAEvolutionStrategy
-
-    for name, function in vars(CMAEvolutionStrategy).copy().items():
-        if isinstance(function, staticmethod) and hasattr(function.__func__, "py_func"):
-            monkeypatch.setattr(CMAEvolutionStrategy, name, staticmethod(function.__func__.py_func))
-
-
-@pytest.mark.parametrize(
-    ("library", "number"), [("optuna", 1), ("nevergrad", 2), ("scipy", 3), ("ribs", 4)]
-)
+@pytest.mark.parametrize(("library", "number"), [("optuna", 1), ("nevergrad", 2), ("scipy", 3)])
 def test_libraries_find_gaits(library: str, number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip(library)
-    if library == "ribs":
-        run_in_python(monkeypatch)
     short = td.load_scenario("coulomb").with_changes({"simulation.duration": "2.5 s"})
     monkeypatch.setattr(td, "load_scenario", lambda name: short, raising=False)
     texts, names = snippets("python", text_of("evolution/libraries")), dict[str, Any]()
@@ -228,6 +215,7 @@ RUNS = (
     "runs",
     *(f"runs/{name}" for name in EXPERIMENTS if (CHECKOUT / "runs" / name).is_dir()),
     *("runs/bench", "runs/damage", "runs/measured", "runs/oscillators", "runs/planning"),
+    *("runs/published", "runs/verification"),
 )
 """Runs of one's own may lie beside the recorded ones."""
 LINK = re.compile(r'(?:\]\(|src="|href=")([^)"]+)')

@@ -3,8 +3,6 @@
 from tetra_drake.engines.preparation import prepare as prepare
 from tetra_drake.engines.simulate import simulate as simulate
 from tetra_drake.engines.simulate import simulate_many as simulate_many
-from tetra_drake.engines.simulation import Simulation as Simulation
-from tetra_drake.engines.states import States as States
 from tetra_drake.evolution.run import load_run as load_run
 from tetra_drake.experiment import evolve as evolve
 from tetra_drake.lab.comparison import compare as compare
@@ -17,6 +15,8 @@ from tetra_drake.lab.planner import Planner as Planner
 from tetra_drake.lab.predict.predict import predict as predict
 from tetra_drake.lab.prototype.export import export as export
 from tetra_drake.lab.spread import spread as spread
+from tetra_drake.lab.stepping.simulation import Simulation as Simulation
+from tetra_drake.lab.stepping.states import States as States
 from tetra_drake.lab.study.equilibrium import study_equilibrium as study_equilibrium
 from tetra_drake.lab.study.robustness import robustness as robustness
 from tetra_drake.lab.study.sweep import sweep as sweep

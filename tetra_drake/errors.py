@@ -162,7 +162,7 @@ class StepBudgetExceeded(SimulationFailure):
 
 
 class TimeBudgetExceeded(Exception):
-    """Failure of a simulation that used up its limit of wall time. It is not a RuntimeError,
+    """Failure of a simulation that used up its limit of CPU time. It is not a RuntimeError,
     because engines treat a RuntimeError as divergence."""
 
     wall_time = 0.0

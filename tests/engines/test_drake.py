@@ -17,6 +17,7 @@ from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -38,8 +39,20 @@ def test_the_work_counts_all_steps_from_the_start(scenario, gait):
     ends = {call.args for call in viewer.wants.call_args_list}
     assert work.steps == len(ends)  # AdvanceTo(0) counts as a step, of no length
     assert work.derivative_evaluations > work.jacobian_evaluations > 0
-    assert work.derivative_evaluations > 5 * work.steps
+    assert work.derivative_evaluations > 3 * work.steps
     viewer.show.assert_not_called()
+
+
+def test_where_friction_is_viscous_steps_after_mode_changes_are_explicit():
+    times = {"cpg.start_up": "0.1 s", "simulation.duration": "2 s", "simulation.steady_from": "1 s"}
+    short, walks = load_scenario("thesis").with_changes(times), []
+    for engine in (Drake(), Drake(scheme="radau3")):
+        chosen = short.with_changes({"engine": engine})
+        walks.append(simulate(chosen, seeded_gait(chosen, 3)))
+    ours, implicit = (walk.integrator for walk in walks)
+    assert ours.steps > 1.5 * implicit.steps  # seen: 2.1
+    assert ours.derivative_evaluations < 0.85 * implicit.derivative_evaluations  # seen: 0.75
+    assert walks[0].metrics.distance_in == pytest.approx(walks[1].metrics.distance_in, abs=0.015)
 
 
 @pytest.mark.parametrize("changes", [{}, {"terrain": Rough(amplitude=2e-3, wavelength=0.1)}])
@@ -65,16 +78,11 @@ def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scena
     assert there[-1]["signals"].any()
 
 
-@pytest.mark.parametrize(
-    ("tetrahedra", "damping", "scheme"),
-    [
-        (5, 0.05, "radau3"),
-        (24, 0.05, "radau3"),
-        (48, 0.05, "runge_kutta3"),
-        (48, 0.5, "radau3"),
-        (13, 0.0, "runge_kutta3"),
-    ],
-)
+SCHEMES = [(5, 0.05, "radau3"), (24, 0.05, "radau3"), (48, 0.05, "runge_kutta3")]
+SCHEMES += [(48, 0.5, "radau3"), (13, 0.0, "runge_kutta3")]
+
+
+@pytest.mark.parametrize(("tetrahedra", "damping", "scheme"), SCHEMES)
 def test_large_robots_are_integrated_explicitly_unless_dampers_are_fast(
     scenario, tetrahedra, damping, scheme
 ):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from helpers import joined
-from helpers.anchored import BAR, HUNG, SWINGING, scenario_of, supported_prism
+from helpers.anchored import HUNG, SWINGING, TREES, scenario_of, supported_prism
 from helpers.bars import ACROSS, CROSSED, RADIUS, STIFFNESS, loose_bars
 from helpers.converged import CONVERGED, shortly
 from helpers.hanging import HANGING, MASS
@@ -141,18 +141,9 @@ def test_by_default_two_bars_on_joints_swing_for_two_seconds_as_analysis_says(en
 
 def bent_body_and_bar() -> Robot:
     """Two bodies, one of three different moments, and a cable that hangs loose between them."""
-    bent = {"a": [0, 0, 0.5], "b": [0.1, 0, 0.5], "c": [0.1, 0.06, 0.5], "d": [0.1, 0.06, 0.52]}
-    pairs = {"bent": [["a", "b"], ["b", "c"], ["c", "d"]], "bar": [["e", "f"]]}
-    slack = {"pairs": [["b", "e"]], "stiffness": 1.0, "damping": 0.0, "free_length": 99.0}
-    tree = {
-        "nodes": bent | {"e": [0.3, 0.0, 0.5], "f": [0.45, 0.05, 0.6]},
-        "struts": {name: BAR | {"pairs": its} for name, its in pairs.items()},
-        "cables": {"loose": slack},
-        "gravity": 0.0,
-    }
     fine = "!Compiled {tolerance: 1e-7 m/s, max_step: 1 ms}"
     v_WB = [[3.0, 7.0, -5.0, 0.1, 0.0, 0.2], [4.0, -9.0, 6.0, 0.0, -0.3, 0.1]]
-    return thrown(Robot.of(scenario_of(tree, duration=0.5, engine=fine)), np.array(v_WB))
+    return thrown(Robot.of(scenario_of(TREES["bent"], 0.5, engine=fine)), np.array(v_WB))
 
 
 def test_thrown_bodies_turn_as_drakes_rigid_bodies():
@@ -298,13 +289,6 @@ def test_forces_do_not_depend_on_when_near_struts_were_searched():
     anew = np.array([forces_at(state, Forces.of(robot.model)) for state in states])
     assert 3 < np.count_nonzero(anew.any(axis=1)) < len(states)
     np.testing.assert_array_equal(forces, anew)
-
-
-def test_struts_that_overlap_at_the_start_are_named(refused):
-    scenario = loose_bars(ACROSS, dissipation=1.0).scenario
-    offsets = [["0 m", "0 m", "1 m"], ["0 m", "0 m", "0.9875 m"]]  # 0.5 mm too near
-    with refused("prism", "strut_contact", "a0 b0", "a1 b1", "0.5 mm"):
-        Robot.of(scenario.with_changes({"robot.offsets": offsets}))
 
 
 def test_the_spin_of_a_bar_about_its_axis_hardly_shortens_steps():

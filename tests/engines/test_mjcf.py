@@ -20,7 +20,6 @@ from tetra_drake.lab.study.equilibrium import (
     robot_of_structure,
     study_equilibrium,
 )
-from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -104,17 +103,3 @@ def test_mujoco_and_drake_read_what_is_written_with_any_name(old, name, tmp_path
     text = make_sdf(study.robot.structure, study.robot.equilibrium.state, name="a")
     Parser(plant).AddModelsFromString(text, "sdf")
     assert plant.HasFrameNamed(f"node {study.robot.structure.node_names[0]}")
-
-
-def test_names_that_other_software_reserves_are_refused(refused):
-    def robot(new: str) -> Robot:
-        tree = renamed(load_scenario("prism").robot.model_dump(), "bar", new)
-        return robot_of_structure(StructureFile.from_tree(tree, "a"), "a")
-
-    def text_of(robot: Robot) -> str:
-        return make_sdf(robot.structure, robot.equilibrium.state, name="a::b")
-
-    with refused("a::b", "robot", "SDFormat"):
-        text_of(robot("bar"))
-    with refused("a", "", "control character"):
-        robot("\x1b")

@@ -34,19 +34,15 @@ def place(system, context):
     return system.GetOutputPort("state").Eval(context)[4]
 
 
-def monte_carlo(scenario, gait, seed, *, samples=4, until=0.0):
-    results = MonteCarloSimulation(
-        make_simulator=functools.partial(MakeDisturbedSimulator, scenario, gait),
-        output=place,
-        final_time=until,
-        num_samples=samples,
-        generator=RandomGenerator(seed),
-    )
-    return [result.output for result in results]
+def monte_carlo(scenario, gait, seed, *, simulation=MonteCarloSimulation, until=0.0, **samples):
+    make = functools.partial(MakeDisturbedSimulator, scenario, gait)
+    given = {"make_simulator": make, "output": place, "final_time": until}
+    return simulation(generator=RandomGenerator(seed), **given | samples)
 
 
 def test_draws_differ_and_the_same_seed_gives_the_same_draws(scenario, gait):
-    first, again, other = (monte_carlo(scenario, gait, seed) for seed in (1, 1, 2))
+    runs = (monte_carlo(scenario, gait, seed, num_samples=4) for seed in (1, 1, 2))
+    first, again, other = ([one.output for one in run] for run in runs)
     assert len({*first, *other}) == 8
     assert first == again
 
@@ -55,10 +51,5 @@ def test_a_random_simulation_ends_where_simulate_does(scenario, gait):
     seed = 11
     [draw] = fresh_draws(scenario, RandomGenerator(seed)(), 1)
     result = simulate(disturbed(scenario, draw).on_engine("drake"), gait, record=True)
-    found = RandomSimulation(
-        make_simulator=functools.partial(MakeDisturbedSimulator, scenario, gait),
-        output=place,
-        final_time=0.3,
-        generator=RandomGenerator(seed),
-    )
+    found = monte_carlo(scenario, gait, seed, simulation=RandomSimulation, until=0.3)
     assert found == pytest.approx(float(result.trajectory.p_WB[-1, 0, 0]), abs=1e-4)

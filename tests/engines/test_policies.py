@@ -102,16 +102,6 @@ def test_the_best_of_an_evolved_policy_is_replayed(tmp_path, optimizer, body):
     assert vector == pytest.approx(run.vector(0, int(run.fittest()["index"])))
 
 
-def test_the_export_of_a_policy_says_that_it_was_in_a_loop(tmp_path):
-    scenario = brief(simulation__sample_period="10 ms")
-    gait = td.seeded_gait(scenario, 1)
-    verdict = td.export(scenario, gait, tmp_path / "lab", rate=50.0)
-    assert "closed loop" in verdict
-    command = td.load_command(tmp_path / "lab" / "command.csv", scenario)
-    played = simulate(scenario, command=command).metrics.distance
-    assert played == pytest.approx(simulate(scenario, gait).metrics.distance, abs=1e-3)
-
-
 def test_a_policy_of_ones_own_is_found_by_its_import_path():
     scenario = brief(policy="!Python {function: helpers.policies:own, count: 1}")
     result = simulate(scenario, td.seeded_gait(scenario))

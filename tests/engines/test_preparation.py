@@ -8,8 +8,8 @@ from helpers.converged import shortly
 from numba.core import event
 
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.gym import TensegrityEnv
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.laws.terrain import Incline
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot

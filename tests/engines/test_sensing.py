@@ -7,7 +7,7 @@ import pytest
 from helpers.anchored import HUNG, scenario_of
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.scenario import Scenario
@@ -98,9 +98,3 @@ def test_draws_have_their_own_errors():
     assert first == same != other
     assert disturbed(scenario.with_sections(sensing=None), draws[0]).sensing is None
     assert dataclasses.asdict(draws[0])["factors"] == {}
-
-
-def test_a_delay_is_a_multiple_of_the_control_period(refused):
-    scenario = bouncing(delay={"lengths": 0.03})
-    with refused("scenario anchored", "sensing.delay.lengths", "0.03 s", "0.02 s"):
-        Simulation(scenario, control_period=PERIOD)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.anchored import LINE, scenario_of
+from helpers.anchored import LINE, TREES, scenario_of
 from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.simulate import simulate
@@ -16,15 +16,9 @@ DROP, G = 0.5, 9.80665  # m until the tether of 1 m is taut, m/s^2
 
 def dropped(engine: str, *, damping: float) -> Scenario:
     """A ball that is dropped from half a metre below its hook, on a tether of 1 m."""
-    tether = LINE | {"pairs": [["hook", "ball"]], "free_length": 1.0, "damping": damping}
-    tree = {
-        "nodes": {"hook": [0.0, 0.0, 2.0], "ball": [0.0, 0.0, 1.0]},
-        "cables": {"tether": tether},
-        "anchors": {"hook": "xyz"},
-        "masses": {"ball": 1.0},
-        "actuated": {"motor": ["tether hook ball"]},
-        "offsets": [[0.0, 0.0, 0.5 + G / LINE["stiffness"]]],  # from where it hangs
-    }
+    tether = TREES["tethered"]["cables"]["tether"] | {"damping": damping}
+    up = [0.0, 0.0, 0.5 + G / LINE["stiffness"]]  # from where it hangs
+    tree = TREES["tethered"] | {"cables": {"tether": tether}, "offsets": [up]}
     # MuJoCo knows no stiffness of friction.
     changes = {"simulation.sample_period": "5 ms", "friction.stiffness": "0 N/m"}
     return scenario_of(tree, duration=1.0, engine=engine, **changes)

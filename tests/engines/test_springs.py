@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.anchored import scenario_of
+from helpers.anchored import TREES, scenario_of
 from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.simulate import simulate
@@ -38,18 +38,13 @@ def pull(name: str, x: float) -> float:
 
 def hung(engine: str) -> Scenario:
     """A mass on each spring, 20 mm above the end of the loose spring."""
-    groups = {
-        name: {"pairs": [[f"h-{name}", f"m-{name}"]], "damping": 0.0, "free_length": FREE} | own
-        for name, own in SPRINGS.items()
-    }
-    nodes = {f"h-{name}": [0.2 * i, 0.0, 1.0] for i, name in enumerate(SPRINGS)}
-    nodes |= {f"m-{name}": [0.2 * i, 0.0, 0.9] for i, name in enumerate(SPRINGS)}
-    tree = {
-        "nodes": nodes,
-        "cables": groups,
-        "anchors": dict.fromkeys([f"h-{name}" for name in SPRINGS], "xyz"),
-        "masses": dict.fromkeys([f"m-{name}" for name in SPRINGS], MASS),
-    }
+    loose = {"damping": 0.0, "free_length": FREE}
+    ends = {name: (f"h-{name}", f"m-{name}") for name in SPRINGS}
+    tree = {"nodes": {}, "cables": {}, "anchors": {}, "masses": {}}
+    for i, (name, (hook, mass)) in enumerate(ends.items()):
+        tree["nodes"] |= {hook: [0.2 * i, 0.0, 1.0], mass: [0.2 * i, 0.0, 0.9]}
+        tree["cables"][name] = loose | SPRINGS[name] | {"pairs": [[hook, mass]]}
+        tree["anchors"][hook], tree["masses"][mass] = "xyz", MASS
     changes = {"simulation.sample_period": "5 ms", "friction.stiffness": "0 N/m"}
     resting = scenario_of(tree, duration=0.3, engine=engine, **changes)
     lengths = Robot.of(resting).structure.initial_lengths
@@ -111,14 +106,84 @@ def test_energy_and_stretch_of_a_spring_fit_its_tension(name):
 
 
 def test_a_string_without_stiffness_gets_that_of_anchors():
-    tree = StructureFile.model_validate(
-        {
-            "nodes": {"h": [0.0, 0.0, 1.0], "m": [0.1, 0.0, 0.6]},
-            "cables": {"line": {"pairs": [["h", "m"]], "string": True, "free_length": 0.4}},
-            "anchors": {"h": "xyz"},
-            "masses": {"m": 2.0},
-        }
-    )
+    tree = StructureFile.model_validate(TREES["strung"])
     law = tree.blueprint().cable_laws[0]
     assert law["stiffness"] == pytest.approx(2.0 * G / (1e-5 * 0.4))  # sags by 1e-5 of its length
     assert law["damping"] == 1e-3 * law["stiffness"]
+
+
+LINE = {"string": True, "stiffness": 2e4, "damping": 20.0}
+COIL = {"stiffness": 200.0, "damping": 0.5, "free_length": FREE}
+
+
+def ended(groups, nodes, fixed, masses, *, moves=None, gravity=G):
+    """Lengths and tensions of cables, and velocities of nodes along x, y and z, after 0.6 s."""
+    tree = {"nodes": nodes, "cables": groups, "masses": masses, "gravity": gravity}
+    tree |= {"anchors": dict.fromkeys(fixed, "xyz")}
+    if moves is not None:
+        bodies = {name: {"velocity": v} for name, v in moves.items()}
+        tree |= {"start": {"rest": False, "bodies": bodies}}
+    scenario = scenario_of(tree, 0.6, engine="!Compiled {tolerance: 1e-6 m/s}")
+    end = simulate(scenario, seeded_gait(scenario, 0), record=True).trajectory.isel(time=-1)
+    return end.length.values, end.tension.values, end.v_WN.sel(node=[*masses]).values
+
+
+def test_a_weight_on_a_string_goes_round_as_a_conical_pendulum():
+    cone, pull = {"h": [0.0, 0.0, 1.0], "m": [0.24, 0.0, 0.68]}, 0.5 * G / 0.8
+    speed, line = np.sqrt(G * 0.24**2 / 0.32), LINE | {"free_length": 0.4 - pull / 2e4}
+    moves = {"m": [0.0, speed, 0.0]}
+    groups = {"l": line | {"pairs": [["h", "m"]]}}
+    _, tension, v = ended(groups, cone, "h", {"m": 0.5}, moves=moves)
+    assert tension[0] == pytest.approx(pull, rel=1e-3)
+    assert np.linalg.norm(v) == pytest.approx(speed, rel=1e-3)
+
+
+def test_two_masses_that_whirl_on_a_string_pull_with_their_centrifugal_force():
+    pair, pull = {"a": [-0.2, 0.0, 1.0], "b": [0.2, 0.0, 1.0]}, 0.5 * 2.0**2 / 0.2
+    groups = {"l": LINE | {"free_length": 0.4 - pull / 2e4, "pairs": [["a", "b"]]}}
+    moves = {"a": [0.0, -2.0, 0.0], "b": [0.0, 2.0, 0.0]}
+    masses = {"a": 0.5, "b": 0.5}
+    _, tension, v = ended(groups, pair, "", masses, moves=moves, gravity=0.0)
+    assert tension[0] == pytest.approx(pull, rel=1e-3)
+    np.testing.assert_allclose(np.linalg.norm(v, axis=1), 2.0, rtol=1e-3)
+
+
+def test_masses_that_a_damped_string_stops_from_parting_go_on_together():
+    pair, line = {"a": [-0.1, 0.0, 1.0], "b": [0.1, 0.0, 1.0]}, {"damping": 2e4, "free_length": 0.4}
+    groups, moves = {"l": LINE | line | {"pairs": [["a", "b"]]}}, {"b": [1.0, 0.0, 0.0]}
+    _, _, v = ended(groups, pair, "", {"a": 0.3, "b": 0.1}, moves=moves, gravity=0.0)
+    np.testing.assert_allclose(v[:, 0], 0.25, atol=5e-3)
+
+
+def test_of_coils_in_a_row_only_those_stretch_whose_initial_tension_is_borne():
+    groups = {
+        "soft": COIL | {"initial_tension": 1.0, "pairs": [["h", "m"]]},
+        "firm": COIL | {"initial_tension": 5.0, "pairs": [["m", "n"]]},
+    }
+    row = {"h": [0.0, 0.0, 1.0], "m": [0.0, 0.0, 0.9], "n": [0.0, 0.0, 0.8]}
+    length, tension, _ = ended(groups, row, "h", {"m": 0.01, "n": 0.3})
+    np.testing.assert_allclose(tension, [0.31 * G, 0.3 * G], rtol=1e-3)
+    np.testing.assert_allclose(length - FREE, [(0.31 * G - 1.0) / 200.0, 0.3 * G / 2e5], atol=1e-5)
+
+
+def test_coils_side_by_side_share_what_exceeds_both_initial_tensions():
+    groups = {
+        f"coil{i}": COIL | {"initial_tension": f, "stiffness": k, "pairs": [["h", "m"]]}
+        for i, (f, k) in enumerate([(1.0, 100.0), (3.0, 300.0)])
+    }
+    one = {"h": [0.0, 0.0, 1.0], "m": [0.0, 0.0, 0.9]}
+    length, tension, _ = ended(groups, one, "h", {"m": 1.0})
+    stretch = (G - 4.0) / 400.0
+    np.testing.assert_allclose(length - FREE, stretch, atol=1e-5)
+    np.testing.assert_allclose(tension, [1.0 + 100.0 * stretch, 3.0 + 300.0 * stretch], rtol=1e-3)
+
+
+def test_a_coil_that_bears_less_than_its_initial_tension_swings_as_a_rod():
+    groups = {"coil": COIL | {"initial_tension": 9.0, "damping": 0.0, "pairs": [["h", "m"]]}}
+    aside = {"h": [0.0, 0.0, 1.0], "m": [FREE * np.sin(0.5), 0.0, 1.0 - FREE * np.cos(0.5)]}
+    length, _, v = ended(groups, aside, "h", {"m": 0.2}, moves={})
+    phase = solve_ivp(
+        lambda _, y: [y[1], -G / FREE * np.sin(y[0])], (0.0, 0.6), [0.5, 0.0], rtol=1e-9
+    ).y[:, -1]
+    assert length[0] == pytest.approx(FREE, abs=4e-5)
+    np.testing.assert_allclose(v[0, 0], FREE * phase[1] * np.cos(phase[0]), atol=5e-3)

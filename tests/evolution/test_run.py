@@ -55,8 +55,15 @@ def test_a_run_in_progress_loads_and_is_left_alone(run_small):
     torn = path.read_bytes()
     assert len(load_run(run).evaluations) == 2 * 42 - 1
     assert path.read_bytes() == torn
-    for file in run.glob("trial_*/*"):
+    done = run / "trial_00" / "evaluations.jsonl"
+    under_way = done.with_name("in_progress.jsonl")
+    first, second = done.read_bytes().splitlines(keepends=True)[:2]
+    under_way.write_bytes(second + first)
+    assert len(load_run(run).evaluations) == 2 * 42 - 1
+    for file in [*run.glob("trial_*/evaluations.jsonl"), *run.glob("trial_*/iterations.jsonl")]:
         file.unlink()
+    assert load_run(run).evaluations["index"].to_list() == [1, 0]
+    under_way.unlink()
     empty = load_run(run)
     assert empty.evaluations.empty
     assert [status.evaluations for status in empty.statuses] == [0, 0]

@@ -18,7 +18,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 import tetra_drake as td
 from helpers.actuations import WINCH
-from helpers.anchored import HUNG, SWINGING, scenario_of
+from helpers.anchored import HUNG, SWINGING, TREES, scenario_of
+from helpers.bars import ACROSS, loose_bars
 from helpers.brief import BRIEF
 from helpers.controllers import OwnGround, Springs
 from helpers.converged import shortly
@@ -26,15 +27,17 @@ from helpers.made_up_walk import make_walk
 from helpers.rod import LAW, rod_with_tendons
 from tetra_drake.engines.drake import MakeDisturbedSimulator
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.figures.style import Look
 from tetra_drake.gym import TensegrityEnv, TensegrityVectorEnv
+from tetra_drake.lab.bridges.sdf import make_sdf
 from tetra_drake.lab.fit.fit import fit
 from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.lab.linearization.linearization import linearize
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.lab.study.sweep import sweep
+from tetra_drake.laws.actuator import Winch
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.contact import MODE_COLUMNS, GroundSection, NormalForce
 from tetra_drake.laws.friction import Coulomb
@@ -46,6 +49,8 @@ from tetra_drake.robot.signals import save_signals
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems import AddCables, AddGroundContact, Cable
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+LIFTED = HUNG | {"actuated": {"lift": ["line top a"]}}
 
 
 def scenario(name: str, changes: Any = None):
@@ -92,13 +97,17 @@ def hung(**changes):
     return scenario_of(HUNG | changes)
 
 
+def started(name: str, **start: Any):
+    return Robot.of(scenario_of(TREES[name] | {"start": {"rest": False} | start}))
+
+
 def tolerant():
     return scenario_of(HUNG | {"tolerances": {"masses": "2 % each"}})
 
 
 def planner(cost: Any = (("p_WN", [0.0, 0.0, -1.0]),), scenario=None, **options):
     """A planner of a lifted mass."""
-    lifted = scenario or scenario_of(HUNG | {"actuated": {"lift": ["line top a"]}}, 0.1)
+    lifted = scenario or scenario_of(LIFTED, 0.1)
     small = {"samples": 32, "horizon": 0.1, "knots": 4, "control_period": 0.01, "workers": 1}
     given = dict(cost) if isinstance(cost, tuple) else cost
     return Planner(lifted, given, **small | {"limits": [[-1.0], [1.0]]} | options)

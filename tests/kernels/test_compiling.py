@@ -134,16 +134,6 @@ def test_damaged_machine_code_is_made_again(folder, damage):
     assert results_and_hits() == [6, 0.5, 2]
 
 
-def test_values_of_a_closure_are_never_those_of_an_earlier_one(folder):
-    def make(factor):
-        def times(x):
-            return factor * x
-
-        return compiled(times)
-
-    assert [make(factor)(2.0) for factor in (3.0, 5.0)] == [6.0, 10.0]
-
-
 @pytest.mark.parametrize(("moment", "minute", "times"), [(0, 60, 1), (0, 0, 2)])
 def test_compilation_that_takes_longer_than_a_moment_is_announced_once_in_a_minute(
     folder, monkeypatch, caplog, moment, minute, times

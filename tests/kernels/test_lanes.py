@@ -132,16 +132,14 @@ def branch_on_a_mask(line, plane):
         line[0] = 0.0
 
 
-@pytest.mark.parametrize(
-    "kernel",
-    [
-        branch_on_a_mask,
-        lambda line, plane: plane[1] > 0.0,  # one index too few
-        lambda line, plane: (line[0] > 0.0) + 1.0,
-        lambda line, plane: select(0.0 < line[0] < 1.0, 1.0, 0.0),
-        lambda line, plane: line[0] + plane[0, 0],  # of other widths
-    ],
-)
+REFUSED = [branch_on_a_mask]
+REFUSED += [lambda line, plane: plane[1] > 0.0]  # one index too few
+REFUSED += [lambda line, plane: (line[0] > 0.0) + 1.0]
+REFUSED += [lambda line, plane: select(0.0 < line[0] < 1.0, 1.0, 0.0)]
+REFUSED += [lambda line, plane: line[0] + plane[0, 0]]  # of other widths
+
+
+@pytest.mark.parametrize("kernel", REFUSED)
 def test_numba_refuses(kernel):
     with pytest.raises(TypingError):
         jit(kernel)(lane_table((3,), 4), lane_table((3, 4), 8))

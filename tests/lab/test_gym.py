@@ -15,8 +15,8 @@ from helpers.actuations import FORCE, MOTOR, WINCH
 from helpers.converged import shortly
 
 from tetra_drake.engines.lanes.batch import processor_lanes
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.gym import ROLL, WALK, TensegrityEnv, TensegrityVectorEnv
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.robot.readings import pitch_rates
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.experiment_sections import Disturbances

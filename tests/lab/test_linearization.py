@@ -1,7 +1,6 @@
 """Small motions about rest against analysis, statics and the engines; LQR."""
 
 import copy
-import dataclasses
 import functools
 import json
 import math
@@ -19,9 +18,9 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from tetra_drake.engines.drake import MakeSimulator
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
 from tetra_drake.lab.linearization.linearization import Linearization, linearize
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.robot.readings import first_readings
@@ -140,18 +139,6 @@ def test_drakes_own_tools_take_a_robot_whose_contacts_keep_their_modes():
     assert not diagram.CreateDefaultContext().num_discrete_state_groups()
 
 
-def test_a_winch_follows_its_command_with_its_lag():
-    scenario = supported_prism(actuation="!Winch {max_force: 200 N, max_speed: 2 m/s}")
-    linear = linearize(scenario)
-    assert {*linear.states[-3:]} == {f"drive {name}" for name in linear.inputs}
-    order = [linear.inputs.index(name.removeprefix("drive ")) for name in linear.states[-3:]]
-    lag, stiffness = scenario.actuation.time_constant, 100.0
-    expected = np.hstack([np.zeros((3, 36)), -np.eye(3) / lag])
-    assert linear.system.A()[-3:] == pytest.approx(expected, abs=1e-6)
-    # The command is l0 - S / k.
-    assert linear.system.B()[-3:] == pytest.approx(-np.eye(3)[order] / (stiffness * lag), rel=1e-7)
-
-
 def test_states_inputs_and_outputs_have_names_and_drake_takes_the_system():
     linear = linearize("prism", outputs=["normal_forces", "v_WN"])
     assert isinstance(linear.system, LinearSystem)
@@ -162,17 +149,6 @@ def test_states_inputs_and_outputs_have_names_and_drake_takes_the_system():
     at = linear.outputs.index("n4 v_z"), linear.states.index("n0 n4 v_z")
     assert linear.system.C()[at] == pytest.approx(1.0)
     assert linear.system.get_output_port().size() == 6 + 18
-
-
-def test_readings_become_states_and_rest_is_their_origin():
-    linear = linearize("prism")
-    assert linear.deviation(first_readings(linear.robot)) == pytest.approx(np.zeros(36), abs=1e-12)
-    p_WB = linear.robot.structure.p_WB.copy()
-    p_WB[:, 2] += 1e-3
-    raised = dataclasses.replace(linear.robot.structure, p_WB=p_WB)
-    moved = first_readings(dataclasses.replace(linear.robot, structure=raised))
-    names = np.array(linear.states)[np.abs(linear.deviation(moved)) > 1e-9]
-    assert names.tolist() == ["n0 n4 z", "n1 n5 z", "n2 n3 z"]
 
 
 def test_a_regulator_holds_a_mast_that_topples_without_it_and_does_so_on_the_diagram():

@@ -15,7 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.lab.bridges.conversion import converted
 from tetra_drake.lab.bridges.ntrt import ntrt_tree
 from tetra_drake.lab.study.equilibrium import robot_of_structure
-from tetra_drake.robot.statics import find_statics
+from tetra_drake.lab.study.statics import find_statics
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario, save_scenario
 from tetra_drake.scenario.robot_structure import StructureFile

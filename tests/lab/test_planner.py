@@ -7,8 +7,8 @@ import pytest
 from helpers.anchored import HUNG, scenario_of
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.lab.planner import Planner
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.scenario import Scenario
@@ -68,15 +68,6 @@ def test_plans_are_changes_of_a_command(hung, delayed):
     usual = Planner(hung, UP, **own).limits
     assert usual[1] < max(changed) <= 2.5
     assert planned(noise=1e-9, limits=[[0.0], [1.2]]) == pytest.approx(np.minimum(held, 1.2))
-
-
-def test_more_samples_find_a_cheaper_plan(hung):
-    state, found = Simulation(hung).state.rows(0), []
-    for samples in (4, 256):
-        planner = Planner(hung, UP, **SMALL | {"samples": samples, "noise": 0.1})
-        plans = [planner(0.01 * period, state._replace(time=0.01)) for period in range(8)]
-        found.append(float(plans[-1][0]))
-    assert -1.0 <= found[0] < found[1] <= 1.0
 
 
 def test_the_cost_sees_motions_at_the_true_time_and_readings_are_assumed_exactly(hung):

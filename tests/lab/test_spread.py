@@ -11,8 +11,6 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.lab.spread import record_spread
 from tetra_drake.report.result_folder import save_result_folder
 from tetra_drake.report.summary import result_text
-from tetra_drake.results.result import headline
-from tetra_drake.settings.units import shown_in
 
 
 def test_a_spread_repeats_and_holds_the_unmoved_start_and_grows_with_chaos(scenario):
@@ -25,17 +23,6 @@ def test_a_spread_repeats_and_holds_the_unmoved_start_and_grows_with_chaos(scena
     # The law of the thesis enlarges 100 nm, friction without steps hardly does.
     smooth = td.spread(short.with_changes({"friction": "!Coulomb"}), gait)["distance"]
     assert 1e-9 < smooth[1] - smooth[0] < 1e-5 and high - low > 2.0 * (smooth[1] - smooth[0])
-
-
-def test_titles_follow_what_the_robot_did():
-    metrics = {"distance": -1.25, "rolled": -13.5}
-    spread = {"distance": [-1.9, -0.2], "rolled": [-13.51, -13.49]}
-    rolling = tiny_scenario().with_changes({"objective": {"rolled": "1 /rad"}})
-    with shown_in("SI"):
-        title = headline(rolling, metrics, spread)
-    moved = "under starts moved by 1e-7 m"
-    assert title == f"rolls 2.1 turns backward, 1.2 m (0.2 to 1.9 {moved}) backward in 0.3 s"
-    assert headline(tiny_scenario(), metrics | {"rolled": 1.0}).startswith("walks ")
 
 
 def test_a_run_and_a_result_keep_their_ranges_and_show_them(tmp_path):

@@ -28,15 +28,13 @@ PAIR = Struts(
 """Two struts of length 2, of two bodies."""
 
 
-@pytest.mark.parametrize(
-    ("first", "second", "distance"),
-    [
-        ([(-1, 0, 0), (1, 0, 0)], [(0, -1, 2), (0, 1, 2)], 2.0),  # they cross
-        ([(-1, 0, 0), (1, 0, 0)], [(0.5, 1, 0), (2.5, 1, 0)], 1.0),  # parallel, side by side
-        ([(-1, 0, 0), (1, 0, 0)], [(0.5, 0, 0), (2.5, 0, 0)], 0.0),  # on one line
-        ([(-1, 0, 0), (1, 0, 0)], [(0, -1, 0), (0, 1, 0)], 0.0),  # they meet
-    ],
-)
+SEGMENTS = [([(-1, 0, 0), (1, 0, 0)], [(0, -1, 2), (0, 1, 2)], 2.0)]  # they cross
+SEGMENTS += [([(-1, 0, 0), (1, 0, 0)], [(0.5, 1, 0), (2.5, 1, 0)], 1.0)]  # parallel, side by side
+SEGMENTS += [([(-1, 0, 0), (1, 0, 0)], [(0.5, 0, 0), (2.5, 0, 0)], 0.0)]  # on one line
+SEGMENTS += [([(-1, 0, 0), (1, 0, 0)], [(0, -1, 0), (0, 1, 0)], 0.0)]  # they meet
+
+
+@pytest.mark.parametrize(("first", "second", "distance"), SEGMENTS)
 def test_segments_are_as_far_apart_as_their_nearest_points(first, second, distance):
     for ends in ([*first, *second], [*first[::-1], *second], [*first, *second[::-1]]):
         nodes = np.zeros((4, NODE_COLUMNS))

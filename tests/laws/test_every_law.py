@@ -14,13 +14,12 @@ from tetra_drake.laws.actuator import (
     DRIVE,
     DRIVE_COLUMNS,
     LIMITED,
-    Actuator,
     DrivenCables,
     actuator_force,
     exertion,
 )
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.laws.friction import FrictionLaw, Slide, TangentSlide
+from tetra_drake.laws.friction import Slide, TangentSlide
 from tetra_drake.laws.height_field import HeightField
 from tetra_drake.scenario.scenario import Scenario
 
@@ -75,10 +74,3 @@ def test_actuators_bear_what_the_cable_does_not_and_follow_their_commands(kind):
         drives[0, [DRIVE, LIMITED, BESIDE]] = drive, pulls.limited, pulls.beside
         own = exertion(actuator, drives, 0, pulls.tension, length, 8.0)
         assert own.load == own.pull == pulls.tension - pulls.beside
-
-
-def test_an_unknown_law_is_refused():
-    with pytest.raises(ValueError, match="unknown law"):
-        friction.friction_force(FrictionLaw(99, np.zeros(9)), slides()[0])
-    with pytest.raises(ValueError, match="unknown kind of actuators"):
-        actuator_force(Actuator(99, np.zeros(4)), 0.2, 0.3, 0.0, 0.0, CABLE)

@@ -42,15 +42,11 @@ def test_reset_friction_is_equation_5_with_the_absolute_speed(velocity, stiffnes
     assert slipping == pytest.approx(-mode * per_length * P0, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("changes", "viscous"),
-    [
-        ({}, True),
-        ({"reset": "reversal"}, False),
-        ({"stiffness": OLSSON}, False),
-        ({"stiction_damping": 1.0}, False),
-    ],
-)
+VISCOUS = [({}, True), ({"reset": "reversal"}, False), ({"stiffness": OLSSON}, False)]
+VISCOUS += [({"stiction_damping": 1.0}, False)]
+
+
+@pytest.mark.parametrize(("changes", "viscous"), VISCOUS)
 def test_friction_is_viscous_where_nodes_never_slip_and_a_bristle_adds_little(changes, viscous):
     thesis = dict(zip(ResetConstants._fields, (P0, SIGMA_1, A_C, SIGMA_0), strict=False))
     assert ResetIntegrator(**thesis | changes).is_viscous == viscous
@@ -63,18 +59,13 @@ def test_friction_is_proportional_to_the_load_where_a_load_is_given():
     assert np.array(at_twice_the_load) == pytest.approx(2.0 * force, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("velocity", "deflection", "mode", "after"),
-    [
-        (0.01, 0.99 * P0, STICK, STICK),
-        (0.01, P0, STICK, 1.0),
-        (-0.01, P0, STICK, STICK),  # beyond the range, but moving inward
-        (-0.01, -P0, STICK, -1.0),
-        (-0.01, 5.0, 1.0, STICK),
-        (-0.01, -5.0, -1.0, -1.0),
-        (0.01, -5.0, -1.0, STICK),
-    ],
-)
+RESETS = [(0.01, 0.99 * P0, STICK, STICK), (0.01, P0, STICK, 1.0)]
+RESETS += [(-0.01, P0, STICK, STICK)]  # beyond the range, but moving inward
+RESETS += [(-0.01, -P0, STICK, -1.0), (-0.01, 5.0, 1.0, STICK), (-0.01, -5.0, -1.0, -1.0)]
+RESETS += [(0.01, -5.0, -1.0, STICK)]
+
+
+@pytest.mark.parametrize(("velocity", "deflection", "mode", "after"), RESETS)
 def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection, mode, after):
     moving = slide(v=(0.0, velocity), x=(0.0, deflection), mode=(STICK, mode))
     assert next_reset_mode(moving, RESET).mode == (STICK, after)
@@ -128,18 +119,16 @@ def test_slow_slip_is_viscous_and_forgets_the_bristle():
     assert force == pytest.approx((-0.07, 0.0), rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("v", "x", "before", "after"),
-    [
-        ((1e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (0.0, 0.0)),  # 0.107 N < 0.6 * 0.2 N
-        ((3e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (1.0, 0.0)),  # 0.121 N
-        ((-1e-4, 0.0), (2e-4, 0.0), (0.0, 0.0), (0.0, 0.0)),  # 0.193 N, but moving back
-        ((1.5e-3, 0.0), (9.0, 9.0), (1.0, 0.0), (1.0, 0.0)),  # 0.105 N > 0.5 * 0.2 N: slips on
-        ((0.0, 1.5e-3), (9.0, 9.0), (1.0, 0.0), (1.0, 0.0)),  # whichever way
-        ((1.4e-3, 0.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0)),  # 0.098 N: the damping holds it
-        ((0.0, 0.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0)),
-    ],
-)
+SLIPS = [((1e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (0.0, 0.0))]  # 0.107 N < 0.6 * 0.2 N
+SLIPS += [((3e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (1.0, 0.0))]  # 0.121 N
+SLIPS += [((-1e-4, 0.0), (2e-4, 0.0), (0.0, 0.0), (0.0, 0.0))]  # 0.193 N, but moving back
+SLIPS += [((1.5e-3, 0.0), (9.0, 9.0), (1.0, 0.0), (1.0, 0.0))]  # 0.105 N > 0.5 * 0.2 N: slips on
+SLIPS += [((0.0, 1.5e-3), (9.0, 9.0), (1.0, 0.0), (1.0, 0.0))]  # whichever way
+SLIPS += [((1.4e-3, 0.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0))]  # 0.098 N: the damping holds it
+SLIPS += [((0.0, 0.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0))]
+
+
+@pytest.mark.parametrize(("v", "x", "before", "after"), SLIPS)
 def test_breaks_free_beyond_the_static_limit_and_sticks_below_the_kinetic_one(v, x, before, after):
     with np.errstate(invalid="ignore"):  # a pull of 0 has no direction, and none is chosen
         mode = next_coulomb_mode(slide(v=v, x=x, mode=before), LAW).mode

@@ -14,18 +14,16 @@ SLOPE = 0.2
 R = np.array([[np.cos(SLOPE), 0, -np.sin(SLOPE)], [0, 1, 0], [np.sin(SLOPE), 0, np.cos(SLOPE)]])
 
 
-@pytest.mark.parametrize(
-    ("value", "rate", "rate_rate", "expected"),
-    [
-        (1.0, -2.0, 0.0, 0.5),  # 1 - 2 t
-        (1.0, 0.0, -50.0, 0.2),  # 1 - 25 t^2
-        (1.0, -3.0, 4.0, 0.5),  # 1 - 3 t + 2 t^2 = (1 - t)(1 - 2 t)
-        (1.0, 3.0, 4.0, 9.0),  # both roots in the past
-        (1.0, -1.0, 4.0, 9.0),  # turns before zero
-        (0.0, -1.0, 0.0, 9.0),  # is there already: the mode changes now, not later
-        (1.0, -0.01, 0.0, 9.0),  # beyond the horizon
-    ],
-)
+ZEROS = [(1.0, -2.0, 0.0, 0.5)]  # 1 - 2 t
+ZEROS += [(1.0, 0.0, -50.0, 0.2)]  # 1 - 25 t^2
+ZEROS += [(1.0, -3.0, 4.0, 0.5)]  # 1 - 3 t + 2 t^2 = (1 - t)(1 - 2 t)
+ZEROS += [(1.0, 3.0, 4.0, 9.0)]  # both roots in the past
+ZEROS += [(1.0, -1.0, 4.0, 9.0)]  # turns before zero
+ZEROS += [(0.0, -1.0, 0.0, 9.0)]  # is there already: the mode changes now, not later
+ZEROS += [(1.0, -0.01, 0.0, 9.0)]  # beyond the horizon
+
+
+@pytest.mark.parametrize(("value", "rate", "rate_rate", "expected"), ZEROS)
 def test_first_zero_of_a_quadratic(value, rate, rate_rate, expected):
     assert first_zero(value, rate, rate_rate, 9.0) == pytest.approx(expected, rel=1e-14)
 
@@ -58,13 +56,11 @@ def test_the_margin_of_a_slipping_node_is_its_speed_that_way(reset, axis, mode):
         assert reset.margin_at(state) == pytest.approx(speed, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("v_x", "upward", "expected"),
-    [
-        (0.05, 0.0, 0.004 * 0.0254 / 0.05),  # free at p0 / v
-        (0.0, 2.0, 0.01),  # 2 m/s^2 lift nodes 1e-4 m deep after sqrt(2 * 1e-4 / 2) s
-    ],
-)
+FORESEEN = [(0.05, 0.0, 0.004 * 0.0254 / 0.05)]  # free at p0 / v
+FORESEEN += [(0.0, 2.0, 0.01)]  # 2 m/s^2 lift nodes 1e-4 m deep after sqrt(2 * 1e-4 / 2) s
+
+
+@pytest.mark.parametrize(("v_x", "upward", "expected"), FORESEEN)
 def test_a_mode_change_is_foreseen_when_it_comes(reset, v_x, upward, expected):
     time = reset.time_to_change((v_x, 0.0, 0.0), (0.0, 0.0, upward))
     assert time == pytest.approx(expected, rel=1e-9)

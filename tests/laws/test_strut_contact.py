@@ -56,28 +56,24 @@ def test_struts_that_cross_push_by_stiffness_and_dissipation_and_never_pull(spee
     np.testing.assert_allclose(below, -on_top, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "second",
-    [
-        [(0, -1, 0.021), (0, 1, 0.021)],  # crossing, 1 mm above
-        [(1.021, 0, 0), (2, 0, 0)],  # end to end
-        [(0, -1, 0), (0, 1, 0)],  # their axes meet
-        ALONG_X,  # the same place
-    ],
-)
+APART = [[(0, -1, 0.021), (0, 1, 0.021)]]  # crossing, 1 mm above
+APART += [[(1.021, 0, 0), (2, 0, 0)]]  # end to end
+APART += [[(0, -1, 0), (0, 1, 0)]]  # their axes meet
+APART += [ALONG_X]  # the same place
+
+
+@pytest.mark.parametrize("second", APART)
 def test_struts_apart_or_with_axes_that_meet_exert_no_force(second):
     assert not forces_between(ALONG_X, second).any()
 
 
-@pytest.mark.parametrize(
-    ("second", "place"),
-    [
-        ([(-1, 0, 0.018), (1, 0, 0.018)], 0.0),  # parallel, side by side
-        ([(0, 0, 0.018), (2, 0, 0.018)], 0.5),  # parallel, half beyond
-        ([(0.7, 0, 0.018), (0.7, 0, 1)], 0.7),  # an end above
-        ([(0.7, -1, 0.018), (0.7, 1, 0.018)], 0.7),  # across
-    ],
-)
+TOUCHING = [([(-1, 0, 0.018), (1, 0, 0.018)], 0.0)]  # parallel, side by side
+TOUCHING += [([(0, 0, 0.018), (2, 0, 0.018)], 0.5)]  # parallel, half beyond
+TOUCHING += [([(0.7, 0, 0.018), (0.7, 0, 1)], 0.7)]  # an end above
+TOUCHING += [([(0.7, -1, 0.018), (0.7, 1, 0.018)], 0.7)]  # across
+
+
+@pytest.mark.parametrize(("second", "place"), TOUCHING)
 def test_struts_touch_where_they_are_nearest_and_parallel_ones_in_the_middle(second, place):
     below, _ = forces_between(ALONG_X, second)
     # Away from their middles, parallel struts count as thinner, here by 0.3 % of both radii.

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.anchored import BAR, HUNG, SWINGING, scenario_of, supported_prism
+from helpers.anchored import HUNG, SWINGING, scenario_of, supported_prism
 from helpers.joined import DOUBLE, RHOMBUS
 
 from tetra_drake.lab.study.equilibrium import structure_text, study_equilibrium
@@ -75,13 +75,6 @@ def test_the_text_tells_of_anchors():
     (row,) = [line for line in text.splitlines() if line.startswith("top")]
     assert [float(cell) for cell in row.split()[1:]] == pytest.approx([0, 0, weight], rel=1e-2)
     assert "ground, undamped" not in text
-
-
-def test_bodies_may_be_joined_by_the_world_alone():
-    two = {"a": [0.0, 0.0, 0.5], "b": [0.0, 0.0, 0.3], "c": [0.2, 0.0, 0.5], "d": [0.2, 0.0, 0.3]}
-    bars = {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}}
-    tree = {"nodes": two, "struts": bars, "anchors": {"a": "xyz", "c": "xyz"}}
-    assert StructureFile.model_validate(tree).body_count == 2
 
 
 @pytest.mark.parametrize("scale", [5e-4, 1.0, 20.0])

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers import joined
-from helpers.anchored import BAR, HUNG, floating_prism, scenario_of, supported_prism
+from helpers.anchored import BAR, HUNG, TREES, floating_prism, scenario_of, supported_prism
+from helpers.files import DATA
 
 from tetra_drake.kernels.packed import Packed
-from tetra_drake.lab.study.equilibrium import robot_of_file
+from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.laws.cable import MEETING, TENSION
 from tetra_drake.laws.capsules import find_touch
 from tetra_drake.laws.forces import Forces, compute_state_forces
@@ -76,17 +77,15 @@ def test_bodies_stay_where_they_are_if_their_cable_is_slack(gravity, height):
 
 
 def test_a_chain_of_bars_hangs_straight_from_wherever_it_is_let_go():
-    # A mechanism that only gravity holds: two bars and two cables, all bent at first.
-    nodes = {"top": [0.0, 0.0, 2.0], "a": [0.3, 0.1, 2.0], "b": [0.5, 0.1, 2.1]}
-    nodes |= {"c": [0.6, 0.3, 2.1], "d": [0.8, 0.3, 2.0]}
-    struts = {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}}
-    line = {"pairs": [["top", "a"], ["b", "c"]], "free_length": 0.2}
-    tree = {"nodes": nodes, "struts": struts, "cables": {"line": LOOSE | line}}
-    robot = Robot.of(scenario_of(tree | {"anchors": {"top": "xyz"}}))
+    # A mechanism that only gravity holds.
+    tree = TREES["chain"]
+    robot, nodes = Robot.of(scenario_of(tree)), tree["nodes"]
     mass = robot.structure.mass
     below = np.array([mass.sum(), mass[1]]) * G  # N, borne by each cable
     assert tensions(robot) == pytest.approx(below, rel=1e-9)
-    bars = [np.linalg.norm(np.subtract(nodes[j], nodes[i])) for i, j in struts["bar"]["pairs"]]
+    bars = [
+        np.linalg.norm(np.subtract(nodes[j], nodes[i])) for i, j in tree["struts"]["bar"]["pairs"]
+    ]
     end = 2.0 - sum(bars) - (0.2 + below / 100.0).sum()
     assert places(robot)["d"] == pytest.approx([0.0, 0.0, end], abs=1e-9)
 
@@ -172,22 +171,16 @@ def test_stiffness_is_how_forces_change_where_the_ends_of_a_piece_meet(scenario)
         assert found @ motion == pytest.approx(expected @ motion, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("c", "d", "pushed"),
-    [
-        ([0.01, -0.1, 0.106], [0.02, 0.1, 0.107], True),  # the second lies across the first
-        ([0.01, 0.003, 0.104], [0.05, 0.1, 0.13], True),  # it ends there
-        ([0.103, 0.003, 0.104], [0.2, 0.1, 0.13], True),  # both do
-        ([0.0, -0.1, 0.1], [0.0, 0.1, 0.1], False),  # their axes meet
-    ],
-)
+TOUCHES = [([0.01, -0.1, 0.106], [0.02, 0.1, 0.107], True)]  # the second lies across the first
+TOUCHES += [([0.01, 0.003, 0.104], [0.05, 0.1, 0.13], True)]  # it ends there
+TOUCHES += [([0.103, 0.003, 0.104], [0.2, 0.1, 0.13], True)]  # both do
+TOUCHES += [([0.0, -0.1, 0.1], [0.0, 0.1, 0.1], False)]  # their axes meet
+
+
+@pytest.mark.parametrize(("c", "d", "pushed"), TOUCHES)
 def test_stiffness_is_how_forces_change_where_struts_touch(c, d, pushed):
-    tree = {
-        "nodes": {"a": [-0.1, 0.0, 0.1], "b": [0.1, 0.0, 0.1], "c": c, "d": d},
-        "struts": {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}},
-        "cables": {"slack": LOOSE | {"pairs": [["a", "c"]]}},
-        "gravity": 0.0,
-    }
+    tree = TREES["two_bars"]
+    tree = tree | {"nodes": tree["nodes"] | {"c": c, "d": d}}
     scenario = scenario_of(tree, **TOUCHING)
     structure = Structure.of(scenario.robot.blueprint())
     resting, state = Unactuated(make_model(scenario, structure)), structure.initial_state
@@ -200,19 +193,11 @@ def test_stiffness_is_how_forces_change_where_struts_touch(c, d, pushed):
         assert found @ motion == pytest.approx(expected @ motion, abs=error)
 
 
-CROSSED = """
-unit: m
-nodes: {a: [-0.1, 0, 0], b: [0.1, 0, 0], c: [0, -0.1, HEIGHT], d: [0, 0.1, HEIGHT]}
-struts:
-  bar: {pairs: [[a, b], [c, d]], diameter: 8 mm, density: 1200 kg/m^3, node_diameter: 0 m}
-cables:
-  tie: {pairs: [[a, c], [b, d]], stiffness: 100 N/m, damping: 0 N*s/m, free_length: 0.5 m}
-"""
+CROSSED = DATA / "structures/crossed.yaml"
 
 
-def test_a_structure_file_may_have_struts_that_overlap(tmp_path):
-    (tmp_path / "crossed.yaml").write_text(CROSSED.replace("HEIGHT", "0.005"))
-    robot = robot_of_file(str(tmp_path / "crossed.yaml"))
+def test_a_structure_file_may_have_struts_that_overlap():
+    robot = study_equilibrium(CROSSED).robot
     nodes = moved_nodes(robot.structure, robot.equilibrium.state)
     pressed = robot.weight / robot.scenario.strut_contact.stiffness
     assert find_touch(robot.model.struts, nodes, 0, 1).depth < pressed
@@ -220,8 +205,8 @@ def test_a_structure_file_may_have_struts_that_overlap(tmp_path):
 
 def test_struts_of_a_structure_file_whose_axes_meet_pass_through_each_other(tmp_path):
     file = tmp_path / "crossed.yaml"
-    file.write_text(CROSSED.replace("HEIGHT", "1e-16"))
-    robot = robot_of_file(str(file))
+    file.write_text(CROSSED.read_text().replace("0.005", "1e-16"))
+    robot = study_equilibrium(file).robot
     assert not robot.model.strut_contact.acts
     assert list(overlaps(robot.scenario, robot.structure, robot.equilibrium.state)) == [
         ("a b", "c d")

@@ -24,14 +24,11 @@ def load(scenario, tmp_path, monkeypatch):
     return load_text
 
 
-@pytest.mark.parametrize(
-    ("quantity", "unit", "actuation", "rate"),
-    [
-        ("force_N", 1.0, FORCE, 30.0),
-        ("free_length_mm", 1e-3, WINCH, 100.0),
-        ("tension_N", 1.0, MOTOR, 2000.0),
-    ],
-)
+QUANTITIES = [("force_N", 1.0, FORCE, 30.0), ("free_length_mm", 1e-3, WINCH, 100.0)]
+QUANTITIES += [("tension_N", 1.0, MOTOR, 2000.0)]
+
+
+@pytest.mark.parametrize(("quantity", "unit", "actuation", "rate"), QUANTITIES)
 def test_a_command_reads_back_as_written(scenario, quantity, unit, actuation, rate, tmp_path):
     driven = scenario.with_changes(actuation)
     robot = Robot.of(driven)

@@ -1,19 +1,16 @@
 """The robot at rest: against an independent simulation, a walk that is not driven, and statics."""
 
-import itertools
 import json
 import math
 
 import numpy as np
 import pytest
 from helpers.quantities import with_unit
-from scipy.sparse import bsr_array
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Incline
 from tetra_drake.robot import equilibrium
-from tetra_drake.robot.equilibrium import Factor
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.structure import node_positions
@@ -98,20 +95,3 @@ def test_a_search_ends_after_steps_by_the_robot_alone(robot, refused, monkeypatc
     monkeypatch.setattr(equilibrium, "LEAST_STEPS", 1)
     with refused("thesis", "robot", f"no equilibrium in {steps} steps;"):
         _ = robot.equilibrium
-
-
-def test_a_sparse_matrix_is_factorised_within_its_envelope():
-    bodies, generator = 40, np.random.default_rng(0)
-    number = generator.permutation(bodies)  # of a row
-    dense = np.zeros((bodies, 6, bodies, 6))
-    for a, b in itertools.pairwise(number):
-        coupled = generator.normal(size=(12, 12))
-        ends = np.ix_([a, b], range(6), [a, b], range(6))
-        dense[ends] += (coupled @ coupled.T).reshape(2, 6, 2, 6)
-    full = dense.reshape(6 * bodies, 6 * bodies)
-    matrix, right = bsr_array(full, blocksize=(6, 6)), generator.normal(size=6 * bodies)
-    factor = Factor.of(matrix, 0.5, least=0.0)
-    expected = np.linalg.solve(full + 0.5 * np.eye(len(full)), right)
-    np.testing.assert_allclose(factor.solved(right), expected, rtol=1e-9)
-    assert factor.envelope.work == 3.0 * (39 * sum(k**2 for k in range(7, 13)) + 91)
-    assert Factor.of(matrix, -50.0, least=0.0) is None

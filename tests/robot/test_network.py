@@ -1,7 +1,5 @@
 """The network of a gait: who inhibits whom, what steering and feedback are made of."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -50,15 +48,6 @@ def test_a_turn_strengthens_the_left_by_what_it_weakens_the_right(scenario):
     np.testing.assert_array_equal(tonic[0], u0)
     once = np.repeat([1.4, 1.0, 0.6], 2)  # extensor and flexor of left, middle, right
     np.testing.assert_allclose(tonic[1], u0 * np.tile(once, 2), rtol=1e-15)
-
-
-def test_a_steering_signal_is_sampled(scenario):
-    both = scenario.with_changes(SIDES | {"simulation.duration": "4.0 s"})
-    gait = dataclasses.replace(seeded_gait(both), turn=0.3)
-    steered = Robot.of(both)
-    assert steered.turns(gait).tolist() == [0.3]
-    turns = steered.turns(gait, lambda time: time / 4.0)
-    np.testing.assert_allclose(turns, np.linspace(0.0, 1.0, 8001), atol=1e-15)
 
 
 def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):

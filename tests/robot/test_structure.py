@@ -73,17 +73,6 @@ def test_the_robot_starts_at_rest_on_its_bottom_nodes_evenly_spaced_and_symmetri
     assert np.array_equal(p_WN[:, [1, 0, 2, 3]] * [1, -1, 1], p_WN)
 
 
-def test_each_junction_has_three_outer_and_three_inner_cables_named_by_their_ends(row):
-    n, base = len(row.bodies), ("bottom_left", "bottom_right", "top")
-    assert row.bodies == tuple(f"T{i}" for i in range(1, n + 1))
-    assert row.cable_names == tuple(
-        f"T{i}-T{i + 1} {role} {node}"
-        for i in range(1, n)
-        for role in ("outer", "inner")
-        for node in base
-    )
-
-
 def test_outer_and_inner_cables_have_their_own_stiffness_and_length(row, scenario):
     # Outer: the spacing s. Inner: from the tip, on the axis at height h = sqrt(2/3) L over its
     # base, to nodes at s and R = L / sqrt(3) off the axis.
@@ -97,12 +86,6 @@ def test_outer_and_inner_cables_have_their_own_stiffness_and_length(row, scenari
         assert name.endswith(row.node_names[cable["node_b"]].split()[1])
         length = np.linalg.norm(p_WN[cable["node_b"]] - p_WN[cable["node_a"]])
         assert length == pytest.approx(inner_length if inner else s, rel=1e-14)
-
-
-def test_the_ground_touches_all_bottom_nodes_and_the_lead_tip(row):
-    touched = [row.node_names[i] for i in row.contacts]
-    bottom = [f"{body} {node}" for body in row.bodies for node in ("bottom_left", "bottom_right")]
-    assert touched == [*bottom, f"{row.bodies[-1]} tip"]
 
 
 @pytest.mark.parametrize("name", ["thesis", "prism", "mast"])

@@ -25,6 +25,7 @@ from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
+from tetra_drake.settings.units import INCH
 
 DRAKE = "`!Drake {}`"
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
@@ -108,6 +109,7 @@ def test_a_run_begins_as_its_scenario_and_seed_say(name):
     folder = tables.HERE / name
     manifest = read_manifest(folder)
     scenario, seeds = manifest.scenario, np.random.SeedSequence(manifest.seed)
+    assert not record.EXPERIMENTS[name].scenario(name).differences(scenario)
     seed = seeds.spawn(scenario.evolution.trials)[0]
     space, generator = ParameterSpace.of(scenario), np.random.default_rng(seed)
     asked = optimizer_of(scenario.optimizer)(space, scenario.evolution, generator).ask()
@@ -120,6 +122,19 @@ def test_the_pages_show_the_recorded_runs(runs):
     assert set(runs) == set(FOLDERS)
     for page in tables.pages(runs):
         assert tables.made_again(page, runs) == page.read_text(encoding="utf-8"), page
+
+
+def test_a_page_says_how_far_its_best_gait_walks_and_how_long(runs):
+    said, units = set(), {"in": INCH, "cm": 0.01}
+    words = r"[Tt]he (?:best|fittest) gait walks ([\d.]+) (in|cm)(?:ches)?(?: in (\d+) s)?"
+    for name, run in runs.items():
+        page = (tables.HERE / name / tables.README).read_text(encoding="utf-8")
+        for number, unit, seconds in re.findall(words, page):
+            walked = tables.distances_of(run, run.best_trial)[0] / units[unit]
+            assert number == f"{walked:.{len(number.partition('.')[2])}f}", name
+            assert seconds in ("", f"{tables.scenario_of(name).simulation.duration:g}"), name
+            said.add(name)
+    assert {"champion", "motors", "pair", "rough", "steps", "twelve", "winch"} <= said
 
 
 def test_numbers_in_the_text_are_those_of_the_records(runs):
@@ -166,7 +181,7 @@ def test_the_gallery_opens_every_replay_in_its_folder(runs, tmp_path, monkeypatc
 def test_a_run_has_its_page_and_picture(name):
     folder = tables.HERE / name
     text = (folder / tables.README).read_text(encoding="utf-8")
-    assert "<!-- to be written -->" not in text and f"`tetra-drake replay runs/{name} --out" in text
+    assert "<!-- to be written -->" not in text and "(../README.md#numbers-of-the-runs)" in text
     assert ("The engines differ by more" in text) == ("## Why the engines differ" in text)
     assert (folder / record.PICTURE).exists()
 

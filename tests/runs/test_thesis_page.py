@@ -41,8 +41,8 @@ def test_the_page_is_current_but_for_the_trials(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_the_page_leaves_nothing_of_the_thesis_out() -> None:
-    assert "**no**" not in TEXT, "a setting is not the thesis's"
+    assert "**not**" not in TEXT, "a setting is not the thesis's"
     for kind, count in (("Fig.", 23), ("Eq.", 10)):
-        found = re.findall(rf"^\| {kind}\xa0(\d+)", TEXT, re.M)
+        found = re.findall(rf"^- \*\*{kind}\xa0(\d+)", TEXT, re.M)
         assert list(map(int, found)) == list(range(1, count + 1))
     assert set(re.findall(r"Table.(\d)", TEXT)) == set("12345678")

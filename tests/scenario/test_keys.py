@@ -34,9 +34,8 @@ def test_an_editor_knows_units_defaults_tags_and_keys_that_files_alone_have():
     for key, node in schema["properties"].items():
         for kind in (kind["title"] for kind in members_of(node, schema) if "title" in kind):
             tags += [f"{kind} mapping", *([] if needs_keys(key, kind) else [f"{kind} scalar:null"])]
-    page = (SCENARIOS / "FORMAT.md").read_text(encoding="utf-8")
-    (told,) = re.findall(r'"yaml.customTags": (\[.*?\])', page, re.S)
-    assert json.loads(told) == list(dict.fromkeys(tags))
+    settings = json.loads((SCENARIOS / "vscode.json").read_text(encoding="utf-8"))
+    assert settings == {"yaml.customTags": list(dict.fromkeys(tags))}
 
 
 def needs_keys(section: str, kind: str) -> bool:
@@ -55,18 +54,3 @@ def test_each_key_and_each_metric_is_explained():
             assert key in rows, key
     assert METRICS.keys() <= rows.keys()
     assert [key for key, text in rows.items() if not text] == []
-
-
-def test_what_kinds_of_a_section_have_in_common_is_told_once():
-    winch, motor = (
-        keys_page().split(f"`actuation`: `{tag}`\n")[1] for tag in ("!Winch", "!TensionMotor")
-    )
-    assert "- `actuation.max_force` (N, > 0): " in winch.split("\n## ")[0]
-    own = motor.split("\n## ")[0]
-    assert (
-        "`actuation.max_force`, `actuation.max_speed`, `actuation.motor` and `actuation.spool`: as"
-        in own
-    )
-    assert "- `actuation.time_constant` (s, > 0): " in own  # with another text
-    phase = keys_page().split("`cpg`: `!Phase`\n")[1].split("\n## ")[0]
-    assert "`cpg.start_up`" in phase and phase.rstrip().endswith("as for `!Matsuoka`")

@@ -126,10 +126,3 @@ def test_nothing_is_shown_of_a_file_that_is_something_else(folder):
                 load_scenario(folder / "mine.yaml")
             assert "secret" not in str(caught.value)
             assert str(folder / "any") in str(caught.value)
-
-
-def test_a_loss_leaves_every_body_some_mass(refused):
-    tree = HUNG | {"masses": {"top2": 0.2}, "nodes": HUNG["nodes"] | {"top2": [0.1, 0.0, 1.0]}}
-    tree["cables"] = {"line": HUNG["cables"]["line"] | {"pairs": [["top", "a"], ["a", "top2"]]}}
-    with refused("scenario anchored", "events[0].lose", "top2", "mass"):
-        scenario_of(tree).with_changes({"events": [{"at": "1 s", "lose": ["top2"]}]})

@@ -60,12 +60,3 @@ def test_a_node_that_nothing_uses_is_left_out_with_a_note(tmp_path, caplog) -> N
     file.write_text(SMALL.replace("nodes:", "nodes:\n  spare: [1, 1, 1]", 1))
     assert read_structure(file).blueprint().node_names == tuple("bacdefg")
     assert "spare" in caplog.text
-
-
-def test_cables_of_two_groups_may_join_the_same_nodes() -> None:
-    given = structure_of(
-        "small", "cables: {long: {pairs: [[e, f], [d, b]]}}\nactuated: {left: [long b d]}"
-    )
-    blueprint = given.blueprint()
-    assert blueprint.cable_names[:3] == ("side b d", "side c d", "long d b")
-    assert blueprint.groups[0] == (2,)

@@ -9,7 +9,7 @@ from helpers.laws import UNEVEN
 from scipy.interpolate import NdBSpline
 
 from tetra_drake.laws.height_field import HeightField
-from tetra_drake.laws.terrain import Grid, Incline, Obstacles, Relief, Rough, Steps, Terrain
+from tetra_drake.laws.terrain import Grid, Obstacles, Relief, Rough, Steps, Terrain
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -46,13 +46,6 @@ def test_a_grid_covers_the_way_and_more(terrain):
     first = np.add(grid.corner, np.multiply(0.5, grid.cell))
     last = first + np.multiply(np.array(grid.heights.shape) - 2, grid.cell)
     assert (first <= [-24 * IN, -30 * IN]).all() and (last >= [120 * IN, 30 * IN]).all()
-
-
-@pytest.mark.parametrize("slope", [0.09, -0.5])
-def test_an_incline_is_a_plane_through_the_origin(slope):
-    x, y = np.random.default_rng(0).uniform([-24 * IN, -30 * IN], [120 * IN, 30 * IN], (4000, 2)).T
-    heights = surface(grid_of(Incline(slope=slope)), x, y)
-    np.testing.assert_allclose(heights, np.tan(slope) * x, atol=1e-12)
 
 
 @pytest.mark.parametrize(("height", "start"), [(-0.25 * IN, None), (5 * IN, -0.1)])
@@ -198,14 +191,12 @@ def test_a_saved_field_does_not_need_the_file_it_was_read_from(tmp_path, damage,
         load_scenario(moved / SCENARIO)
 
 
-@pytest.mark.parametrize(
-    ("grid", "fact"),
-    [
-        (Grid(np.full((3, 3), np.nan), (-1.0, -1.0), (1.0, 1.0)), "nan in row 1"),
-        (Grid(np.zeros(9), (-1.0, -1.0), (1.0, 1.0)), "9 heights"),
-        (Grid(np.zeros((3, 3)), (-1.0, -1.0), (0.0, 1.0)), "cells of (0.0, 1.0) m"),
-    ],
-)
+GRIDS = [(Grid(np.full((3, 3), np.nan), (-1.0, -1.0), (1.0, 1.0)), "nan in row 1")]
+GRIDS += [(Grid(np.zeros(9), (-1.0, -1.0), (1.0, 1.0)), "9 heights")]
+GRIDS += [(Grid(np.zeros((3, 3)), (-1.0, -1.0), (0.0, 1.0)), "cells of (0.0, 1.0) m")]
+
+
+@pytest.mark.parametrize(("grid", "fact"), GRIDS)
 def test_the_grid_of_a_kind_is_held_to_what_a_height_file_is(grid, fact, refused):
     class Odd(Relief):
         def grid(self, **_: Any) -> Grid:

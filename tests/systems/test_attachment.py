@@ -32,8 +32,6 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems import AddCables, AddGroundContact, Cable
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
-WINCH = Winch(max_force=1e6, max_speed=1e3, time_constant=0.05)
-
 
 def simulated(diagram: Diagram, time: float, *, accuracy: float = 1e-6) -> Simulator:
     simulator = Simulator(diagram)
@@ -120,18 +118,6 @@ def test_a_hinged_rod_sinks_into_the_ground_by_half_its_weight_over_the_stiffnes
     context = plant.GetMyContextFromRoot(simulator.get_context())
     depth = -tip.CalcPoseInWorld(context).translation()[2]
     assert depth == pytest.approx(0.5 * MASS * GRAVITY / law.stiffness, rel=1e-5)
-
-
-def test_a_winch_without_limits_pulls_an_arm_as_a_force_does():
-    def angle(actuation: Winch | None) -> float:
-        builder, plant, _, cables = rod_with_tendons(free_length=0.15)
-        actuated = {"pull": ["right"]}
-        network = AddCables(builder, plant, cables=cables, actuated=actuated, actuation=actuation)
-        signal = builder.AddSystem(ConstantVectorSource([6.0]))
-        builder.Connect(signal.get_output_port(), network.GetInputPort("signals"))
-        return float(state_at(builder.Build(), 4.0)[0])
-
-    assert angle(WINCH) == pytest.approx(angle(None), abs=1e-6)
 
 
 def test_the_force_of_a_cable_fades_where_its_ends_meet_and_one_without_end_is_named():

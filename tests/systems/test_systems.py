@@ -19,7 +19,7 @@ from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.systems import CableNetwork, MatsuokaCpg, Steering
+from tetra_drake.systems import Steering
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
@@ -35,24 +35,6 @@ def test_exports_what_a_user_plots(robot, gait):
     sizes = {"state": 65, "signals": 4, "tensions": 24, "lengths": 24}
     sizes |= {"normal_forces": 11, "friction_forces": 22, "contact_forces": 33, "modes": 33}
     assert {port.get_name(): len(port.Eval(context)) for port in ports} == sizes
-
-
-@pytest.mark.parametrize(("signals", "network"), [("listing", 0), ("live", 4 * 4)])
-def test_the_friction_brings_no_continuous_state(scenario, gait, signals, network):
-    robot = Robot.of(scenario.with_changes({"cpg.signals": signals}))
-    diagram = MakeTensegrityDiagram(robot, gait)
-    assert isinstance(diagram.GetSubsystemByName("cpg"), MatsuokaCpg) == bool(network)
-    assert diagram.CreateDefaultContext().num_continuous_states() == 13 * 5 + network
-
-
-@pytest.mark.parametrize(("slack", "least"), [(True, 0.0), (False, -97.4)])
-def test_slack_cables_do_not_push(scenario, slack, least):
-    robot = Robot.of(scenario.with_changes({"robot.cables.slack": slack}))
-    cables = CableNetwork(robot.model, names=robot.structure.cable_names, signals=4)
-    context = cables.CreateDefaultContext()
-    cables.GetInputPort("state").FixValue(context, robot.structure.initial_state)
-    cables.GetInputPort("signals").FixValue(context, np.full(4, -100.0))
-    assert cables.GetOutputPort("tensions").Eval(context).min() == pytest.approx(least, abs=0.1)
 
 
 @pytest.mark.parametrize(("height", "touches"), [(-1e-5, True), (1e-5, False)])

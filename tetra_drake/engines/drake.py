@@ -67,6 +67,8 @@ _FINEST = 2e-5
 _RENEWAL = 20
 """Most steps with one Jacobian of a robot with anchors or joints, whose stiff springs turn with its
 bodies."""
+_GOING_ON = InitializeParams(suppress_initialization_events=True)
+"""Parameters of Initialize() for a simulation that goes on."""
 
 
 class _Pace(NamedTuple):
@@ -93,7 +95,7 @@ _VISCOUS = _Pace(
 )
 """For friction that is nearly viscous. A foot that lands fast is thrown off the ground by its
 friction, up to seven thousand times per second. Steps that end at each of these contacts gain
-nothing."""
+nothing. By default they are explicit: one takes 3 evaluations, an implicit one 17."""
 
 
 class DrakeEngine(Engine):
@@ -217,13 +219,14 @@ class _DiagramRobot:
         self._work.before = work
         self._sampler.follow(sampler, context)
         self._aimer.follow(aimer)
-        parameters = InitializeParams()
-        parameters.suppress_initialization_events = True
-        self._simulator.Initialize(parameters)  # without a monitor, which would aim the step anew
+        # Without a monitor, which would aim the step anew.
+        self._simulator.Initialize(_GOING_ON)
         self._monitor()
 
     def _after_step(self, context: Context) -> None:
         # Nothing here may change the simulation, whether it is recorded or watched or not.
+        if self._aimer.is_switching:
+            return
         check_time()
         robot, viewer = self._driven.robot, self._viewer
         bodies, now = self._state.Eval(context), context.get_time()
@@ -256,8 +259,8 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     and at most 5e-3, or 1e-2 where friction is nearly viscous; a tenth of this for robots with
     joints. If it sets no longest step, Robot.longest_step limits it.
 
-    The simulator's monitor lets steps end where contact modes change; see _StepAimer. Another
-    monitor replaces it.
+    The simulator's monitor lets steps end where contact modes change, and may replace the
+    integrator, so ask for it anew; see _StepAimer. Another monitor replaces this one.
     """
     check_type("MakeSimulator", "diagram", diagram, Diagram)
     check_type("MakeSimulator", "robot", robot, Robot)
@@ -272,12 +275,16 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
 def _make_simulator(diagram: Diagram, robot: Robot, steps: _Steps) -> Simulator:
     simulator = Simulator(diagram)
     SetStart(diagram, simulator.get_mutable_context(), robot)
-    integrator = ResetIntegratorFromFlags(simulator, steps.scheme, steps.pace.max_step)
-    integrator.set_target_accuracy(steps.accuracy)
+    _set_integrator(simulator, steps.scheme, steps)
     if not steps.at_step_end:
         window = _WITNESS_WINDOW * min(1.0, steps.accuracy / 1e-3)
         simulator.get_mutable_context().SetAccuracy(window / _WITNESS_WINDOW_PER_ACCURACY)
     return simulator
+
+
+def _set_integrator(simulator: Simulator, scheme: str, steps: _Steps) -> None:
+    integrator = ResetIntegratorFromFlags(simulator, scheme, steps.pace.max_step)
+    integrator.set_target_accuracy(steps.accuracy)
 
 
 def MakeDisturbedSimulator(
@@ -321,6 +328,8 @@ class _Steps:
     pace: _Pace
     renewal: float
     """Most steps with one Jacobian."""
+    settling: int
+    """Number of explicit steps after a mode change; 0 if none are explicit."""
 
     @classmethod
     def of(cls, robot: Robot, settings: Drake) -> _Steps:
@@ -333,12 +342,18 @@ class _Steps:
         pace = pace._replace(max_step=longest)
         if settings.look_ahead is not None:
             pace = pace._replace(look_ahead=settings.look_ahead)
+        scheme, settling = settings.scheme or default_scheme(robot), 0
+        if robot.scenario.friction.is_viscous and settings.scheme is None and scheme == "radau3":
+            # They take as many evaluations as a Jacobian, which the next implicit step needs.
+            settling = 13 * len(robot.structure.bodies) // 3
+            pace = pace._replace(first_step=math.inf, renew_from=math.inf)
         return cls(
-            scheme=settings.scheme or default_scheme(robot),
+            scheme=scheme,
             accuracy=settings.accuracy or accuracy,
             at_step_end=settings.mode_changes == "step_end",
             pace=pace,
             renewal=_RENEWAL if is_jointed or robot.model.anchors.nodes.size else math.inf,
+            settling=settling,
         )
 
 
@@ -377,10 +392,17 @@ class _Work:
 
     @property
     def integrator(self) -> IntegratorBase:
-        """The simulator's integrator."""
+        """The simulator's present integrator."""
         simulator = self._simulator()
         assert simulator is not None
         return simulator.get_mutable_integrator()
+
+    def go_on(self, scheme: str, steps: _Steps) -> None:
+        """Replaces the integrator by a new one. Calls the simulator's monitor."""
+        self.before, simulator = self.total(), self._simulator()
+        assert simulator is not None
+        _set_integrator(simulator, scheme, steps)
+        simulator.Initialize(_GOING_ON)
 
     def total(self, scheme: str = "", accuracy: float = 0.0) -> IntegratorWork:
         before, statistics = self.before, dict(self.integrator.GetStatisticsSummary())
@@ -418,6 +440,10 @@ class _StepAimer:
     Newton's iterations converge, slowly and with an error of one sign. So we renew the Jacobian,
     unless the next step is shorter than `renew_from`. It is also renewed after `renewal` steps.
 
+    Where friction is nearly viscous, the default scheme has explicit steps after a mode change: the
+    integrator is runge_kutta3 until `settling` steps have passed without another mode change, and
+    then a new radau3. Error control limits their length.
+
     All this is for the scheme radau3 with `mode_changes: step_end`. With any scheme, struts
     that approach limit the step, so that they cannot pass through each other.
     """
@@ -439,25 +465,37 @@ class _StepAimer:
         self._last_velocities = self._acceleration = np.zeros(size)
         self._longest = steps.pace.max_step
         self._jacobian_is_old = False
+        self._steps, self._settled = steps, steps.settling  # steps since a mode change
+        self._is_explicit = self.is_switching = False
 
     def follow(self, other: _StepAimer) -> None:
         """Goes on as another aimer would, in the diagram of a changed robot."""
         self._last_time, self._last_velocities = other._last_time, other._last_velocities
         self._longest, self._acceleration = other._longest, other._acceleration
         self._jacobian_is_old, self._age = other._jacobian_is_old, other._age
+        self._settled = other._settled
+        if other._is_explicit:
+            self._switch()
         longest = other._work.integrator.get_maximum_step_size()
         self._work.integrator.set_maximum_step_size(longest)
         self._work.integrator.request_initial_step_size_target(longest)  # for Initialize()
 
+    def _switch(self) -> None:
+        """Goes on with the other integrator: the explicit or the implicit one."""
+        self._is_explicit, self.is_switching = not self._is_explicit, True
+        self._work.go_on("runge_kutta3" if self._is_explicit else "radau3", self._steps)
+        self.is_switching = False
+
     def aim(self, context: Context) -> None:
         """Limits the length of the next step. Call it after each step, with the simulator's context
         at the end of the step."""
-        pace, integrator = self._pace, self._work.integrator
-        longest = pace.max_step
+        if self.is_switching:
+            return
+        pace, longest = self._pace, self._pace.max_step
         if self._struts is not None:
             here = self._struts.GetMyContextFromRoot(context)
             longest = self._struts.LongestStep(here, horizon=longest)
-            integrator.set_maximum_step_size(longest)
+            self._work.integrator.set_maximum_step_size(longest)
         if not self._aims:
             return
         velocities = self._state.Eval(context)[-self._last_velocities.size :]
@@ -471,6 +509,9 @@ class _StepAimer:
             acceleration=self._acceleration,
             horizon=pace.max_step,
         )
+        self._settled = 0 if due else self._settled + 1
+        if self._is_explicit != (self._settled < self._steps.settling):
+            self._switch()
         if due:
             self._longest, self._jacobian_is_old = pace.first_step, True
         elif self._longest < pace.max_step:
@@ -480,7 +521,7 @@ class _StepAimer:
         else:
             margin = min(_AIM_BEYOND, 0.25 * pace.look_ahead)
             aimed = max(pace.look_ahead, _AIM_FACTOR * time_to_change + margin)
-        step = min(longest, self._longest, aimed)
+        step, integrator = min(longest, self._longest, aimed), self._work.integrator
         self._age += 1
         if self._age >= self._renewal or (self._jacobian_is_old and step >= pace.renew_from):
             self._work.before = self._work.total()

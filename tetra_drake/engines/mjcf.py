@@ -25,7 +25,7 @@ from tetra_drake.robot.structure import (
     PASSIVE_COLOUR,
     STRUT_COLOUR,
     Structure,
-    rotated,
+    turned_back,
 )
 from tetra_drake.robot.xml_elements import add_comment, add_element, xml_text
 from tetra_drake.scenario.engine_kinds import Mujoco
@@ -93,7 +93,7 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     add_element(model, "compiler", inertiafromgeom="false")
     contact = {"cone": "elliptic", "impratio": _IMPRATIO}
     add_element(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
-    if not pulled and (remark := loose_remark(robot)):
+    if not own_laws and (remark := loose_remark(robot)):
         add_comment(model, remark)
     world = add_element(model, "worldbody")
     if scenario.terrain.is_ground:
@@ -148,9 +148,11 @@ def is_pulled(robot: Robot) -> bool:
 def loose_remark(robot: Robot) -> str:
     """Remark on differences between MuJoCo's tendons and the robot's cables, with names of such
     cables; "" if there are none. See tendon_faults() of laws.cable."""
-    structure, remarks = robot.structure, []
+    structure = robot.structure
+    rubs = ", ".join(structure.rubbing)
+    remarks = [f"friction at rings and in joints, left out: {rubs}"] if rubs else []
     if not robot.scenario.actuation.keeps_spring:
-        return ""
+        return "".join(remarks)
     for fault, cables in tendon_faults(structure.cables, slack=structure.slack).items():
         names = [name for name, has_it in zip(structure.cable_names, cables, strict=True) if has_it]
         some = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
@@ -232,7 +234,7 @@ def _add_key(model: Element, structure: Structure, name: str, state: np.ndarray)
     poses, velocities = np.split(state, [7 * len(structure.bodies)])
     q_WB, p_WB = np.split(poses.reshape(-1, 7), [4], axis=1)
     w_WB, v_WB = np.split(velocities.reshape(-1, 6), 2, axis=1)
-    w_WB_B = rotated(q_WB * [1.0, -1.0, -1.0, -1.0], w_WB)
+    w_WB_B = turned_back(q_WB, w_WB)
     axes = np.array([_bar_axis(structure, body) for body in range(len(structure.bodies))])
     w_WB_B = w_WB_B - axes * (axes * w_WB_B).sum(axis=1, keepdims=True)
     motion = {"qvel": np.hstack([v_WB, w_WB_B])} if velocities.any() else {}
@@ -334,7 +336,7 @@ def _add_joints(model: Element, structure: Structure, *, step: float) -> None:
     the largest one that is stable in explicit steps.
     """
     constraints, joints = add_element(model, "equality"), structure.joint_springs
-    for first, second, body_a, body_b, stiffness, damping in zip(*joints, strict=True):
+    for first, second, body_a, body_b, stiffness, damping, _ in zip(*joints, strict=True):
         time_constant = damping / stiffness
         k = 1.0 / (step * (step + 2.0 * time_constant))
         per_mass = 1.0 / structure.mass[body_a] + 1.0 / structure.mass[body_b]

@@ -53,7 +53,7 @@ from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Phase, Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
-from tetra_drake.robot.structure import rotated
+from tetra_drake.robot.structure import turned_back
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.world import World
 
@@ -77,6 +77,9 @@ class MujocoEngine(Engine):
         if scenario.cpg.feedback:
             problem = f"found {scenario.cpg.feedback}; mujoco computes signals beforehand"
             raise InputError(scenario.name, "cpg.feedback", problem)
+        if keys := scenario.robot.blueprint().rubbing:
+            problem = "has friction at rings or in a joint, which mujoco cannot simulate"
+            raise InputError(scenario.name, f"robot.{keys[0]}", problem)
         check_mjcf(scenario)
 
     def simulate(
@@ -232,9 +235,9 @@ class _MujocoRobot:
         old, moved = self._body_states(states), states.copy()
         after, bodies = phase.entered(old, before), np.arange(len(phase.p_BC))[:, np.newaxis]
         p, v = 7 * bodies + np.arange(3), self._model.nq + 6 * bodies + np.arange(3)
-        back = after[:, 7 * bodies + np.arange(4)] * [1.0, -1.0, -1.0, -1.0]
+        q_WB = after[:, 7 * bodies + np.arange(4)]
         moved[:, 1 + p], moved[:, 1 + v] = after[:, 4 + p], after[:, 3 + v]
-        moved[:, 4 + v] += rotated(back, after[:, v] - old[:, v])  # 0 without a push
+        moved[:, 4 + v] += turned_back(q_WB, after[:, v] - old[:, v])  # 0 without a push
         return moved
 
     def _advance_to(self, time: float) -> None:

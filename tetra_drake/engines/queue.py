@@ -80,8 +80,8 @@ class SimulationQueue:
         same order.
 
         A future raises the same errors as simulate(). On the compiled engine it raises
-        TimeBudgetExceeded if the simulation takes longer than `time_budget` (s of wall time); other
-        engines ignore the budget. Callbacks of futures run in the threads of the queue.
+        TimeBudgetExceeded if its thread computes for longer than `time_budget` (s); other engines
+        ignore the budget. Callbacks of futures run in the threads of the queue.
         """
         jobs = [_Job(scenario, driver, time_budget) for scenario, driver in drivers]
         with self._changed:
@@ -168,7 +168,7 @@ class _Crew:
         except Exception as error:  # a gait may not fit its scenario
             job.future.set_exception(error)
             return True
-        job.deadline = time.perf_counter() + job.time_budget
+        job.deadline = time.thread_time() + job.time_budget
         self.jobs[self.idle.pop(0)] = job
         return True
 
@@ -179,7 +179,7 @@ class _Crew:
         if batch is None or not self.jobs:
             return
         batch.advance(briefly=True)
-        now, ended = time.perf_counter(), batch.ended
+        now, ended = time.thread_time(), batch.ended
         for place, job in list(self.jobs.items()):
             if ended[place]:
                 try:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from typing import TypeAlias
+from pathlib import Path
+from typing import TypeAlias, cast
 
 from tetra_drake.engines.engine import Viewer, check_can_be_watched, engine_of
 from tetra_drake.engines.queue import SimulationQueue
@@ -17,10 +19,10 @@ from tetra_drake.robot.command import (
     driven_robot,
     robot_of_controller,
 )
+from tetra_drake.robot.gait import SteeringSignal, constant_steering
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.steering import SteeringSignal, constant_steering
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -51,7 +53,8 @@ def simulate(
 
     Args:
         scenario: a scenario, its name or file, or a run.
-        gait: a gait, its file, or a run (see load_run()), which means its best gait.
+        gait: a gait, its file, or a run (see load_run()), which means its best gait. Not needed if
+            `scenario` is a run.
         command: a command in place of a gait; see load_command().
         controller: a function in place of a gait, from the time (s) and the readings of the robot
             (see robot.readings.Readings) to an action for each driven cable (see Simulation).
@@ -66,6 +69,7 @@ def simulate(
         Diverged, StepBudgetExceeded: if the simulation fails; they have the time and the reason.
         InputError: if an argument does not fit the scenario, or the engine has no viewer.
     """
+    own_gait = _best_gait_of(scenario)
     scenario = given_scenario(scenario)
     check_type("simulate", "record", record, bool)
     if steering is not None and not callable(steering):
@@ -80,11 +84,18 @@ def simulate(
     if command is not None and (gait is not None or steering is not None):
         raise InputError("simulate", "command", "excludes a gait, and steering")
     given = gait if command is None else command
+    given = own_gait if given is None else given
     if given is None:
         raise InputError("simulate", "gait", "is needed, or a command, or a controller")
     driver = given if isinstance(given, Command) else given_gait(given, scenario)
     robot = driven_robot(scenario, driver, steering=steering)
     return engine_of(scenario).simulate(robot, record=record, viewer=viewer)
+
+
+def _best_gait_of(scenario: GivenScenario) -> GivenGait | None:
+    """The run or its folder, which means its best gait; None for other scenarios."""
+    is_folder = isinstance(scenario, (str, Path)) and os.path.isdir(scenario)
+    return cast(GivenGait, scenario) if is_folder or hasattr(scenario, "best_gait") else None
 
 
 def simulate_many(

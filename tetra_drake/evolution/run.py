@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import os
@@ -16,6 +17,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import (
     EVALUATIONS,
+    IN_PROGRESS,
     ITERATIONS,
     LINES,
     REEVALUATIONS,
@@ -215,7 +217,8 @@ def gait_label(row: pandas.Series) -> str:
 
 
 def load_run(path: str | Path) -> Run:
-    """Loads a run directory, finished or not, as pandas tables.
+    """Loads a run directory, finished or not, as pandas tables. `evaluations` includes an
+    iteration under way.
 
         >>> run = td.load_run("runs/demo")
         >>> result = td.simulate(run.scenario, run.best_gait())
@@ -231,7 +234,7 @@ def load_run(path: str | Path) -> Run:
     manifest = read_manifest(directory)
     # A running process writes iterations last. They are read first, so no evaluation is missing.
     iterations = _table(directory, manifest, ITERATIONS)
-    evaluations = _table(directory, manifest, EVALUATIONS)
+    evaluations = _table(directory, manifest, EVALUATIONS, IN_PROGRESS)
     reevaluations = _table(directory, manifest, REEVALUATIONS)
     if not iterations.empty:
         for trial, lines in iterations.groupby("trial"):
@@ -243,17 +246,21 @@ def load_run(path: str | Path) -> Run:
     return Run(directory, manifest, evaluations, iterations, reevaluations)
 
 
-def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
-    """Table of the lines in the files `name` of all trials, one row per line. For its columns, see
-    Run."""
+def _table(directory: Path, manifest: Manifest, *names: str) -> pandas.DataFrame:
+    """Table of the lines in the files `names` of all trials, one row per line; what one of them has
+    is not read from the next. For its columns, see Run."""
     import pandas
 
-    kind, parameters = LINES[name], _parameters(manifest.scenario)
-    blueprint, rows = manifest.scenario.robot.blueprint(), []
-    for trial in range(manifest.scenario.evolution.trials):
+    kind, parameters = LINES[names[0]], _parameters(manifest.scenario)
+    blueprint = manifest.scenario.robot.blueprint()
+    rows: list[dict[str, Any]] = []
+    for trial, name in itertools.product(range(manifest.scenario.evolution.trials), names):
         file = RecordFile.of(directory, manifest.run, name, trial=trial)
+        known = {row["index"] for row in rows if row["trial"] == trial} if name != names[0] else ()
         for number, line in enumerate(file.read()):
             row = {"trial": trial, **line.content()}
+            if row.get("index") in known:
+                continue
             rows.append(row)
             if kind is not EvaluationLine:
                 continue

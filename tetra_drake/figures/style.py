@@ -12,7 +12,6 @@ import contextlib
 import functools
 import inspect
 import io
-import json
 import math
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -23,7 +22,6 @@ from typing import Any, TypeAlias
 
 import matplotlib.style
 import numpy as np
-import pandas
 import xarray
 from matplotlib import rcParams
 from matplotlib.axes import Axes
@@ -33,7 +31,7 @@ from matplotlib.rcsetup import cycler
 from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import whole_file, write_whole
+from tetra_drake.files import whole_file
 from tetra_drake.robot.measures import Span
 from tetra_drake.settings.units import shown_in
 
@@ -302,31 +300,6 @@ def legend_below(page: Page, lines: Mapping[str, Any], *others: Any) -> None:
         if columns == 1 or legend.get_window_extent().width <= page.bbox.width:
             return
         legend.remove()
-
-
-def save_findings(
-    figure: Figure,
-    folder: Path,
-    name: str,
-    *,
-    tables: Mapping[str, pandas.DataFrame],
-    summary: Mapping[str, Any],
-    kinds: Sequence[str] = FILE_KINDS,
-) -> list[str]:
-    """Writes the results of an analysis to a folder: tables as CSV, summary.json, and the figure.
-
-    The keys of `tables` are names of files without .csv; `name` is the name of the figure's files.
-    `kinds` are the figure's file types.
-
-    Returns the names of the files. Raises InputError if a file cannot be written.
-    """
-    for table, rows in tables.items():
-        write_whole(folder / f"{table}.csv", rows.to_csv(index=False))
-    text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
-    write_whole(folder / "summary.json", text + "\n")
-    save_figure(figure, folder, name, kinds=kinds)
-    csv_files = [f"{table}.csv" for table in tables]
-    return [*csv_files, "summary.json", *(f"{name}.{kind}" for kind in kinds)]
 
 
 @common_style()

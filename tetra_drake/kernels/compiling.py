@@ -38,8 +38,6 @@ _OPTIONS: dict[str, Any] = {
     "fastmath": {"contract"},
     "no_cfunc_wrapper": True,  # only C code would call the wrapper
 }
-CALLED: Any = _OPTIONS
-"""Numba's options of functions that kernels call: inlined, they would slow robots that never do."""
 INLINED: Any = _OPTIONS | {"forceinline": True}
 """Numba's options of functions that become part of the machine code of their callers."""
 _MOMENT, _MINUTE = 2.0, 60.0
@@ -88,14 +86,22 @@ def merged(function: F) -> F:
     return _kernel(function, inline="always")
 
 
-def inlined(function: F, *, options: Any = INLINED) -> F:
+def inlined(function: F) -> F:
     """Decorator of a small function that becomes part of the machine code of kernels that call it.
-    With other `options` of numba, such as CALLED, it is a function of its own there.
 
     A call from Python runs the plain Python function, because another compilation for such calls
     would take as long again.
     """
+    return _for_kernels(function, INLINED)
 
+
+def called(function: F) -> F:
+    """Decorator of a function that kernels call: inlined, it would slow robots that never need it.
+    A call from Python is as for `inlined`."""
+    return _for_kernels(function, _OPTIONS)
+
+
+def _for_kernels(function: F, options: Any) -> F:
     @overload(function, jit_options=options)
     @functools.wraps(function)
     def implementation(*_: object) -> F:

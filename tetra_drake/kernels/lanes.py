@@ -315,6 +315,18 @@ def sine(x: Real) -> Real:
     return (1.0 - 2.0 * odd) * y * series
 
 
+@inlined
+def exponential(x: Real) -> Real:
+    """exp(x) for numbers or lanes, with a relative error of at most 1e-13 up to 6, by Taylor's
+    series of a 64th of x."""
+    y, series = x * (1.0 / 64.0), 1.0 + 0.0 * x
+    for divisor in (8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0):
+        series = 1.0 + y * (1.0 / divisor) * series
+    for _ in range(6):
+        series = series * series
+    return series
+
+
 def gather(numbers: Table, index: Real, offset: int) -> Real:
     """Reads numbers[index + offset], with a separate index for each lane. `numbers` (size,) has no
     lanes: all simulations share it. `index` has whole numbers, as floats."""

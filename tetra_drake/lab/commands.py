@@ -109,6 +109,7 @@ def _structure(
     """
     from tetra_drake.engines.mjcf import loose_remark, make_mjcf
     from tetra_drake.lab.bridges.conversion import converted
+    from tetra_drake.lab.bridges.formats import foreign_format, save_structure
     from tetra_drake.lab.bridges.sdf import make_sdf
     from tetra_drake.lab.study.equilibrium import (
         robot_of_file,
@@ -117,11 +118,7 @@ def _structure(
         structure_text,
         study_equilibrium,
     )
-    from tetra_drake.scenario.structure_files import (
-        foreign_format,
-        read_structure,
-        save_structure,
-    )
+    from tetra_drake.scenario.structure_files import read_structure
 
     if mode is not None and (out is None or out.suffix in (".yaml", ".yml")):
         raise InputError("structure", "--mode", "needs --out, a page")
@@ -345,12 +342,12 @@ def _predict(
 
     Example: tetra-drake predict my.yaml --quantities 'n3 z' --out out
     """
+    from tetra_drake.lab.bridges.formats import names_scenario
     from tetra_drake.lab.predict.predict import predict
     from tetra_drake.lab.study.equilibrium import robot_of_file
     from tetra_drake.robot.command_file import load_command
     from tetra_drake.scenario.load import load_scenario
     from tetra_drake.scenario.scenario import scenario_of
-    from tetra_drake.scenario.structure_files import names_scenario
 
     is_scenario = names_scenario(source)
     scenario = load_scenario(source) if is_scenario else scenario_of(robot_of_file(source).scenario)

@@ -34,10 +34,10 @@ from tetra_drake.figures.style import (
     name_panel,
     page_of,
     page_width,
-    save_findings,
     titled,
 )
 from tetra_drake.formatting import TextTable, fixed, ranged, rounded
+from tetra_drake.lab.page import save_findings
 from tetra_drake.lab.study.statistics import (
     interquartile_mean,
     interval,

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from tetra_drake.errors import InputError, check_type
+from tetra_drake.lab.study.statics import TOLERANCE, find_statics, null_space
 from tetra_drake.laws.cable import CableLaw, elastic_tension
-from tetra_drake.robot.statics import TOLERANCE, find_statics, null_space
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.robot_structure import StructureFile

@@ -17,8 +17,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.engines.simulation import Simulation
-from tetra_drake.engines.states import States
 from tetra_drake.errors import (
     InputError,
     check_positive,
@@ -26,6 +24,8 @@ from tetra_drake.errors import (
     check_whole,
     checked_numbers,
 )
+from tetra_drake.lab.stepping.simulation import Simulation
+from tetra_drake.lab.stepping.states import States
 from tetra_drake.laws.actuator import limits_of
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.readings import Readings

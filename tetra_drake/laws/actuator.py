@@ -344,7 +344,7 @@ class LimitedActuator(ActuatorKind):
     }
 
     max_force: ForceQuantity = Field(gt=0)
-    """Tension at which the actuator stalls. A greater tension pulls a winch backward."""
+    """Tension at which the actuator stalls. A greater one pulls a winch backward."""
     max_speed: Speed = Field(gt=0)
     """Speed at which the actuator winds a cable without tension."""
     time_constant: Time = Field(gt=0)
@@ -379,8 +379,8 @@ class Winch(LimitedActuator):
     command_unit = 1e-3
 
     time_constant: Time = Field(default=0.02, gt=0)
-    """Time constant of the lag with which the free length follows its command; by default typical
-    of small geared motors (8 Hz)."""
+    """Time constant of the free length behind its command; by default typical of small geared
+    motors (8 Hz)."""
     least_length: Length = Field(default=0.0, ge=0)
     """Least free length to which the winch winds a cable."""
 

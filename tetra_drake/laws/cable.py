@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.kernels.compiling import CALLED, inlined
+from tetra_drake.kernels.compiling import called, inlined
 from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, select
 
 PASSIVE = -1
@@ -116,6 +116,8 @@ class CableLaw(NamedTuple):
     intact: Real = 1.0
     """0 for a cut cable, which no actuator pulls; otherwise 1. A cut cable has no stiffness and no
     damping either."""
+    mu: Real = 0.0
+    """Coefficient of friction at the rings of a routed cable; see laws.dry_friction."""
     curve: Curve = NO_CURVE
     """Tension of the spring in place of k x."""
 
@@ -213,7 +215,8 @@ def law_of(cables: Cables, i: int) -> CableLaw:
     """Constants of cable i, from the tables of the constants of all cables."""
     law, curve = cables.law, cables.law.curve
     own = Curve(curve.rows, i * curve.pieces, curve.pieces)
-    return CableLaw(law.stiffness[i], law.damping[i], law.free_length[i], law.intact[i], own)
+    numbers = law.stiffness[i], law.damping[i], law.free_length[i], law.intact[i], law.mu[i]
+    return CableLaw(*numbers, own)
 
 
 DIRECTION, LENGTH, TENSION, TENSION_PER_RATE, RATE, CABLE_FORCE_COLUMNS = 0, 3, 4, 5, 6, 7
@@ -232,7 +235,7 @@ def elastic_tension(stretch: Real, law: CableLaw) -> Real:
     return tension
 
 
-@functools.partial(inlined, options=CALLED)
+@called
 def tension_on_curve(stretch: Real, tension: Real, curve: Curve) -> Real:
     """Tension (N) of a cable's curve at a stretch (m); `tension` (N) before its first piece."""
     for piece in range(curve.pieces):
@@ -327,9 +330,8 @@ def tendon_faults(cables: Table, *, slack: bool) -> dict[str, Table]:
     """Cables that MuJoCo's tendons cannot imitate: for each reason a mask (cables,), True where it
     holds.
 
-    The keys are the reasons as sentences. `cables` is an array of a type of
-    cable_type(). `slack` is true if
-    cables go slack.
+    The keys are the reasons as sentences. `cables` is an array of a type of cable_type(). `slack`
+    is true if cables go slack.
     """
     is_damped = slack & (cables["damping"] != 0.0)
     is_cubic = np.array([tendon_coefficients(one["curve"]) is not None for one in cables], bool)

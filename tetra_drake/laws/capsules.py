@@ -334,10 +334,10 @@ class HuntCrossley(Section):
     d of the overlap, with the rate d', is F = k d (1 + c d'); see laws.capsules."""
 
     stiffness: Stiffness = Field(gt=0)
-    """Stiffness k of a contact: force divided by depth of the overlap."""
+    """Stiffness k: force divided by depth of the overlap."""
     dissipation: InverseSpeed = Field(ge=0)
-    """Hunt-Crossley dissipation c, as Drake defines it. The restitution of an impact at a low speed
-    v is 1 - 2/3 c v."""
+    """Hunt-Crossley dissipation c, as in Drake. An impact at a low speed v has the restitution 1 -
+    2/3 c v."""
 
     def law(self, search: StrutSearch) -> StrutContactLaw:
         """Law for the kernels, with these settings as constants. `search` has the constants of the

@@ -63,8 +63,8 @@ class GroundSection(Section):
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of the ground: normal force divided by the depth of a node in the ground."""
     damping: Annotated[DampingPerLength, Varied()] = Field(ge=0)
-    """Damping of the ground: lambda = 3/2 alpha stiffness. The restitution of an impact at the
-    speed v is 1 - alpha v (Eq. 2)."""
+    """Damping of the ground: lambda = 3/2 alpha stiffness. An impact at the speed v has the
+    restitution 1 - alpha v (Eq. 2)."""
 
 
 class NormalForce(NamedTuple):

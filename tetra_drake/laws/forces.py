@@ -10,7 +10,7 @@ import numpy as np
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, any_lane, inverse_sqrt, maximum, select
 from tetra_drake.kernels.packed import Packed, allocate, unpacked
-from tetra_drake.laws import actuator, cable, capsules, contact, kinematics, terrain
+from tetra_drake.laws import actuator, cable, capsules, contact, dry_friction, kinematics, terrain
 from tetra_drake.laws.friction import friction_force
 from tetra_drake.laws.inertia import INERTIA_COLUMNS, times_inertia, turn_inertia
 from tetra_drake.laws.model import Model
@@ -37,6 +37,10 @@ class Forces(NamedTuple):
     cable_forces: Annotated[Table, "cables", cable.CABLE_FORCE_COLUMNS]
     route_slopes: Annotated[Table, "route_nodes", 3]
     """Derivative of a routed cable's length by the position of each node of its path."""
+    rings: Annotated[Table, "route_nodes", dry_friction.RING_COLUMNS]
+    """Pieces of the cables with friction at rings; see laws.dry_friction."""
+    slip_slopes: Annotated[Table, "route_nodes", 3]
+    """Derivative of the slip at a ring by the position of each node of its path."""
     ground_forces: Annotated[Table, "contacts", contact.GROUND_FORCE_COLUMNS]
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
     """Inertia of the bodies along the world's axes; unused if they are isotropic."""
@@ -182,8 +186,8 @@ def span(nodes: Table, a: int, b: int) -> tuple[Vector3, Real, Real]:
 
 @functools.partial(compiled, nogil=True)  # a call of its own: inlined, it slows other robots
 def add_routed_cables(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
-    """Adds the forces of the cables that run over frictionless rings; see add_cable_forces(). Also
-    writes `forces.route_slopes`."""
+    """Adds the forces of the cables that run over rings; see add_cable_forces(). Also writes
+    `forces.route_slopes` and `forces.rings`."""
     nodes, routes, slopes = forces.nodes, robot.cables.routes, forces.route_slopes
     parts = forces.cable_forces
     for i in range(parts.shape[0]):
@@ -202,10 +206,83 @@ def add_routed_cables(robot: Model, signals: Table, write_parts: bool, forces: F
         for k in range(first, last + 1):
             pull = scaled(-tension, vector_at(slopes, k, 0))
             add_vector(pull, routes.nodes[k], kinematics.FORCE, nodes)
+        if any_lane(robot.cables.law.mu[i] > 0.0):
+            add_ring_friction(robot, i, length, rate, maximum(tension, 0.0), forces)
         if write_parts:
             put_vector(scaled(-1.0, vector_at(slopes, first, 0)), i, cable.DIRECTION, parts)
             parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
             parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
+
+
+@inlined
+def add_ring_friction(
+    robot: Model, i: int, length: Real, rate: Real, tension: Real, forces: Forces
+) -> None:
+    """Adds what the pieces of routed cable i pull more or less than its mean `tension` (N) to the
+    forces on the nodes; see laws.dry_friction. Also writes `forces.rings`.
+
+    `length` is in m, `rate`, the rate of the length, in m/s.
+    """
+    routes, nodes, rings, cables = robot.cables.routes, forces.nodes, forces.rings, robot.cables
+    stretches, first, last = rate, routes.first[i], routes.first[i + 1] - 1
+    if cables.signal[i] != cable.PASSIVE and actuator.has_drive(robot.actuator):
+        winds = forces.drives[cables.drive[i], actuator.RATE]
+        stretches = rate - actuator.wound(robot.actuator, winds, 0.0 * rate)
+    before = before_rate = mean = 0.0 * length
+    share = 1.0 + before
+    for k in range(first, last):
+        along, part, part_rate = span(nodes, routes.nodes[k], routes.nodes[k + 1])
+        if k > first:
+            slip = before_rate - before * stretches
+            turn = dry_friction.turn_between(vector_at(rings, k, dry_friction.ALONG), along)
+            ratio, damping = dry_friction.capstan(slip, cables.law.mu[i] * turn, tension)
+            share = share / ratio
+            rings[k, dry_friction.BEFORE], rings[k, dry_friction.DAMPING] = before, damping
+        put_vector(along, k + 1, dry_friction.ALONG, rings)
+        rings[k + 1, dry_friction.SHARE] = share
+        before += part / length
+        before_rate += part_rate
+        mean += share * part / length
+    for k in range(first, last):
+        more = tension * (rings[k + 1, dry_friction.SHARE] / mean - 1.0)
+        pull = scaled(more, vector_at(rings, k + 1, dry_friction.ALONG))
+        add_vector(pull, routes.nodes[k], kinematics.FORCE, nodes)
+        add_vector(scaled(-1.0, pull), routes.nodes[k + 1], kinematics.FORCE, nodes)
+
+
+@inlined
+def put_slip_slopes(first: int, ring: int, last: int, forces: Forces) -> None:
+    """Writes the derivatives of the slip at a ring to `forces.slip_slopes`, for the path from row
+    `first` to row `last`. `ring` is its row in `forces.rings`, which add_ring_friction() wrote."""
+    rings, slopes = forces.rings, forces.slip_slopes
+    put_vector((0.0, 0.0, 0.0), first, 0, slopes)
+    for k in range(first + 1, last + 1):
+        weight = (1.0 if k <= ring else 0.0) - rings[ring, dry_friction.BEFORE]
+        along = scaled(weight, vector_at(rings, k, dry_friction.ALONG))
+        add_vector(scaled(-1.0, along), k - 1, 0, slopes)
+        put_vector(along, k, 0, slopes)
+
+
+@functools.partial(compiled, nogil=True)  # a call of its own, as for routed cables
+def add_joint_friction(robot: Model, state: Table, generalized: Table) -> None:
+    """Adds the friction of joints to the generalized force (6*bodies,): see laws.dry_friction.
+    `state` is [q; v] (13*bodies,)."""
+    joints = robot.joints
+    for i in range(joints.node_a.size):
+        if any_lane(joints.friction[i] > 0.0):
+            w = joint_spin(robot, state, i)
+            per_spin, _ = dry_friction.spin_friction(w, joints.friction[i])
+            for axis in range(3):
+                generalized[6 * joints.body_a[i] + axis] += per_spin * w[axis]
+                generalized[6 * joints.body_b[i] + axis] -= per_spin * w[axis]
+
+
+@inlined
+def joint_spin(robot: Model, state: Table, i: int) -> Vector3:
+    """Angular velocity (rad/s) of the second body of joint i relative to the first, in the world
+    frame. `state` is [q; v] (13*bodies,)."""
+    w_WA = kinematics.angular_velocity(state, robot.joints.body_a[i])
+    return difference(kinematics.angular_velocity(state, robot.joints.body_b[i]), w_WA)
 
 
 @inlined
@@ -256,6 +333,8 @@ def compute_forces(
     add_ground_forces(robot, state, modes, write_parts, forces)
     add_state_forces(robot, state, forces)
     gather_forces(robot, forces.nodes, generalized)
+    if robot.joints.node_a.size:
+        add_joint_friction(robot, state, generalized)
     bodies = generalized.size // 6
     for body in range(bodies):
         generalized[6 * body + 5] -= robot.bodies.weight[body]
@@ -365,6 +444,8 @@ def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     add_state_forces(robot, state, forces)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+    if robot.joints.node_a.size:
+        add_joint_friction(robot, state, generalized)
 
 
 @compiled

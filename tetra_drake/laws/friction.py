@@ -224,15 +224,15 @@ class ResetIntegrator(FrictionKind):
     proportional_stiction: Annotated[DampingPerLength, Varied()] = Field(ge=0)
     """Friction divided by deflection and by velocity, sigma_0."""
     stiffness: Stiffness = Field(default=0.0, ge=0)
-    """Stiffness of the bristle: friction divided by deflection, as sigma_0 in Olsson's model."""
+    """Stiffness of the bristle, sigma_0 in Olsson's model."""
     reset: Literal["range", "reversal", "never"] = "range"
     """Where the deflection becomes 0: at the stiction `range`, and the node sticks again at once;
-    or at `reversal` of the velocity; or `never`."""
+    at `reversal` of the velocity; or `never`."""
     breaks_free: Literal["each", "both"] = "each"
-    """Tangents along which a node breaks free: `each` by itself, or `both` as soon as the
-    deflection along one reaches the stiction range."""
+    """Tangents along which a node breaks free: `each` by itself, or `both` as soon as one
+    deflection reaches the stiction range."""
     load: ForceQuantity | None = Field(default=None, gt=0)
-    """Normal force for which the other settings are given, if friction is proportional to it."""
+    """Normal force for which the other settings hold, if friction is proportional to it."""
 
     def law(self) -> FrictionLaw:
         same = {name: value for name, value in self if name in ResetConstants._fields}
@@ -455,9 +455,9 @@ class Coulomb(FrictionKind):
     forward: float = Field(default=1.0, gt=0)
     """Factor on the coefficients for slip along the body's heading."""
     backward: float = Field(default=1.0, gt=0)
-    """Factor on the coefficients for slip against the body's heading."""
+    """The factor for slip backward."""
     lateral: float = Field(default=1.0, gt=0)
-    """Factor on the coefficients for sideways slip."""
+    """The factor for sideways slip."""
 
     @model_validator(mode="after")
     def _check(self) -> Coulomb:

@@ -96,9 +96,10 @@ def _read_heights(path: str) -> np.ndarray:
 
 class HeightField(Relief):
     """Heights in m from a file: numpy's `.npy`, or text of numbers separated by blanks or commas.
-    Rows are along x and columns along y, ascending; the grid's centre is the origin. There are at
+
+    Rows are along x, columns along y, ascending; the grid's centre is the origin. There are at
     least 3 x 3 and at most 4 million heights. A relative path starts in the folder of the scenario
-    file. A record keeps a copy of the file, named by a digest of the heights.
+    file. A record keeps a copy, named by a digest of the heights.
     """
 
     file: HeightPath

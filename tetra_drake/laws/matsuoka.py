@@ -169,8 +169,8 @@ class Matsuoka(CpgKind):
     partner_weight: float = Field(ge=0)
     """Weight of the inhibition between extensor and flexor of an oscillator."""
     reach: int | None = Field(default=None, ge=0)
-    """Oscillators at most this far apart inhibit each other (see Blueprint.distances); all if not
-    given."""
+    """Oscillators at most this far apart inhibit each other (see Blueprint.distances); by default
+    all."""
 
     @property
     def tonic(self) -> float:

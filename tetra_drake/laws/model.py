@@ -87,6 +87,8 @@ class Joints(NamedTuple):
     """Stiffness (joints,), the same along all axes."""
     damping: Table
     """Damping (joints,), the same along all axes."""
+    friction: Table
+    """Torque limit (joints,) of the friction; 0 without."""
 
 
 class NodeLoads(NamedTuple):
@@ -151,7 +153,7 @@ class Model(NamedTuple):
             couplings=Couplings(no_index, no_index, first[:1], no_index),
             ground=ground or Ground.nowhere(),
             anchors=AnchorSprings(no_index, no_index, no_vectors, no_vectors, no_vectors),
-            joints=Joints(no_index, no_index, no_index, no_index, none, none),
+            joints=Joints(*[no_index] * 4, *[none] * 3),
             loads=NodeLoads(no_index, no_vectors),
             bodies=Bodies(np.zeros(bodies), np.zeros((bodies, 6)), *np.zeros((2, bodies))),
             struts=Struts(no_index, no_index, no_index, no_index, first, none, none),

@@ -73,13 +73,12 @@ class GaitBounds(Section):
     tau_a_max: Time = Field(gt=0)
     """Greatest time constant tau_A of the inner state u of an oscillator."""
     turn: float = Field(default=0.0, ge=-1, le=1)
-    """Steering of all random and evolved gaits, -1 to 1. Left oscillators get the input u0 (1 +
-    turn), right ones u0 (1 - turn)."""
+    """Steering of all random and evolved gaits. Left oscillators get the input u0 (1 + turn), right
+    ones u0 (1 - turn)."""
     mirrored: bool = False
-    """True if random and evolved gaits have the same weights on the left and on the right."""
+    """True if random and evolved gaits have the same weights left and right."""
     independent_tau_b: bool = False
-    """True if tau_B, the time constant of self-inhibition, evolves by itself. Otherwise it stays at
-    2 tau_A."""
+    """True if tau_B, the time constant of self-inhibition, evolves. Otherwise it is 2 tau_A."""
 
     @model_validator(mode="after")
     def _check(self) -> GaitBounds:
@@ -139,8 +138,8 @@ class CpgKind(Section):
     start_up: Time = Field(default=1.25, ge=0)
     """Time until which the cables are not actuated."""
     signals: Literal["listing", "live"] = "live"
-    """How the signals are computed. `listing`: before the simulation, by forward Euler, as in the
-    thesis's listing. `live`: integrated with the robot, as feedback needs it."""
+    """How signals are computed: `listing`, before the simulation by forward Euler, as the thesis's
+    code does; or `live`, integrated with the robot."""
     listing_step: Time = Field(default=5e-4, ge=1e-6)
     """Time step of signals that are computed beforehand."""
     feedback: list[Pathway] = Field(default=[])

@@ -78,12 +78,12 @@ def phase_outputs(states: Table, outputs: Table, law: PhaseConstants) -> None:
 
 
 class PhaseOscillators(CpgKind):
-    """Settings of phase oscillators with controlled amplitudes. Frequency, amplitudes, lags and
-    coupling are parameters of a gait; here are their bounds in random gaits, and equal bounds fix
-    them. With fixed amplitudes, common lags and a fixed coupling, a gait is a travelling sine.
+    """Settings of phase oscillators with controlled amplitudes.
 
-    The oscillators start with their lags and without amplitude. The signal of the first one rises
-    through 0 at the start-up time.
+    Frequency, amplitudes, lags and coupling are parameters of a gait; here are their bounds in
+    random gaits, and equal bounds fix them. With fixed amplitudes and coupling and common lags a
+    gait is a travelling sine. The oscillators start with their lags and without amplitude; the
+    first one rises through 0 at the start-up time.
     """
 
     tag = "Phase"
@@ -94,14 +94,14 @@ class PhaseOscillators(CpgKind):
     amplitude: Annotated[list[Annotated[float, Field(ge=0)]], *PAIR] = Field(default=[0.5, 1.0])
     """Bounds of the amplitudes; `gain` is the signal per unit."""
     lag: Annotated[list[Angle], *PAIR] = Field(default=[-math.pi, math.pi])
-    """Bounds of the phase by which an oscillator is behind the one before it."""
+    """Bounds of the phase by which an oscillator is behind the one before."""
     coupling: Annotated[list[Annotated[InverseTime, Field(ge=0)]], *PAIR] = Field(
         default=[8.0, 8.0]
     )
-    """Bounds of the coupling w of neighbours. A phase that is displaced by a little comes back at a
-    rate of about w."""
+    """Bounds of the coupling w of neighbours. A small displacement of a phase decays at a rate of
+    about w."""
     common: list[Literal["amplitude", "lag"]] = Field(default=[])
-    """Parameters that random and evolved gaits have in common for all oscillators."""
+    """Parameters that all oscillators of random and evolved gaits share."""
     settling: InverseTime = Field(default=20.0, gt=0)
     """Rate at which amplitudes settle."""
 

@@ -222,12 +222,12 @@ class TalliedMetrics:
     """Metrics that are computed from the tally of all steps of a simulation."""
 
     rolled: float = metric("rad", "forward positive", total("rolled"))
-    """Angle by which the robot has rolled forward, about the world's y axis, at the end; whole
-    turns count: the integral of the angular velocity of the rigid motion that fits the nodes'
-    velocities best."""
+    """Angle by which the robot has rolled forward, about the world's y axis, whole turns included:
+    the integral of the angular velocity of the rigid motion that fits the nodes' velocities
+    best."""
     actuator_work: float = metric("J", "of all actuators", total("effort.work"), is_cost=True)
-    """Work of the actuators in the steady stretch, if they recover no energy: the integral of
-    max(0, -S dl/dt) for driven cables with signal S and length l."""
+    """Work of the actuators in the steady stretch, none recovered: the integral of max(0, -S dl/dt)
+    for driven cables with signal S and length l."""
     signal_rate: float = metric(
         "N/s",
         "how fast signals change",
@@ -236,37 +236,37 @@ class TalliedMetrics:
         ),
         is_cost=True,
     )
-    """Root mean square of dS/dt over all signals S in the steady stretch. Smaller is smoother."""
+    """Root mean square of dS/dt over all signals S in the steady stretch."""
     lifted: float = metric(
         "",
         "time off the ground",
         lambda walk: sum(walk.lifted_shares) / len(walk.lifted_shares),
         is_share=True,
     )
-    """Share of the steady stretch during which no contact node of a body bears a normal force, mean
-    over the bodies. In MuJoCo it says little."""
+    """Share of the steady stretch during which no contact node of a body bears a force, mean over
+    the bodies. In MuJoCo it says little."""
     clearance: float = metric("m", "smallest gap of struts' axes", total("clearance"), least=True)
-    """Least distance, at any time, between the axes of struts of two bodies. Struts overlap if it
-    is less than their diameter."""
+    """Least distance, at any time, between strut axes of two bodies. Struts overlap below their
+    diameter."""
     tension: float = metric("N", "smallest of any cable", total("least_tension"), least=True)
     """Least tension of any cable at any time. Below 0 the cable would have to push."""
     peak_actuator_force: float = greatest(
         "N", "without the start; a cable can pull a winch backward", total("effort.peak_force")
     )
-    """Greatest load of an actuator in the steady stretch: the tension of its cable, without what
-    the cable's own spring exerts beside an actuator with limits. It exceeds the `max_force` of a
-    winch while the robot stretches the cable faster than the stalled winch pays out."""
+    """Greatest load of an actuator in the steady stretch: the tension of its cable, without the
+    cable's own spring beside an actuator with limits. It exceeds `max_force` of a winch that is
+    pulled backward."""
     mean_actuator_force: float = metric("N", "of all driven cables", mean("impulse"), is_cost=True)
     """Mean load of the actuators in the steady stretch."""
     peak_actuator_speed: float = greatest("m/s", "without the start", total("effort.peak_speed"))
-    """Greatest speed of an actuator in the steady stretch, winding or paying out: the rate of the
-    free length for a winch, otherwise of the cable's length."""
+    """Greatest speed of an actuator in the steady stretch, winding or paying out: of the free
+    length for a winch, otherwise of the cable's length."""
     mean_actuator_speed: float = metric("m/s", "winding or paying out", mean("wound"), is_cost=True)
-    """Mean speed of the actuators in the steady stretch, winding or paying out."""
+    """Mean speed of the actuators in the steady stretch."""
     peak_actuator_power: float = greatest("W", "without the start", total("effort.peak_power"))
     """Greatest product of an actuator's load and winding speed in the steady stretch."""
     mean_actuator_power: float = greatest("W", "effort of an actuator", mean("pulled"))
-    """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
+    """Mean positive power of an actuator in the steady stretch."""
     actuator_limited: float = greatest(
         "", "time at a limit of an actuator", mean("limited"), is_share=True, needs=LIMITS
     )

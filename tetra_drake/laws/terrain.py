@@ -453,10 +453,11 @@ class Incline(Relief):
 
 
 class Steps(Relief):
-    """Stairs across the robot's path: h = height min(count, floor((x - start) / depth) + 1), and 0
-    before x = `start`. An edge rises over one cell of the grid before it and one behind it; a cell
-    is about as long as a step is high, at most a quarter of the depth. Round feet with a radius
-    above twice the height meet sharp edges.
+    """Stairs across the robot's path.
+
+    h = height min(count, floor((x - start) / depth) + 1), and 0 before `start`. An edge rises over
+    one cell of the grid before it and one behind it; a cell is about as long as a step is high, at
+    most a quarter of the depth. Feet with a radius above twice the height meet sharp edges.
     """
 
     place = "over steps"
@@ -469,7 +470,7 @@ class Steps(Relief):
     count: int = Field(ge=1)
     """Number of steps."""
     start: Length | None = None
-    """Coordinate x of the first step; 1 in ahead of the robot if not given."""
+    """Coordinate x of the first step; by default 1 in ahead of the robot."""
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         start = ahead if self.start is None else self.start
@@ -483,9 +484,10 @@ class Steps(Relief):
 
 
 class Rough(Relief):
-    """Random ground, interpolated smoothly between the heights of a grid. Neighbours are half a
-    wavelength apart, with independent heights, uniform between -2 amplitude and 0, so that a robot
-    at z = 0 touches the ground without sinking in.
+    """Random ground, interpolated smoothly between the heights of a grid.
+
+    Neighbours are half a wavelength apart. Heights are independent and uniform between -2 amplitude
+    and 0, so a robot at z = 0 does not sink in.
     """
 
     place = "on rough ground"
@@ -495,7 +497,7 @@ class Rough(Relief):
     wavelength: Length = Field(gt=0)
     """Twice the distance between heights."""
     seed: int = Field(ge=0, default=0)
-    """Seed of the random heights. The same seed gives the same ground."""
+    """Seed of the random heights."""
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         half = 0.5 * self.wavelength
@@ -507,10 +509,11 @@ class Rough(Relief):
 
 
 class Obstacles(Relief):
-    """Round bumps, h = height max(0, 1 - (r / radius)^2) at the distance r from a bump's centre;
-    the highest counts. Each square of side `spacing` has one, at a random position; none reaches
-    before `start`. The ground is interpolated smoothly between the heights of a grid, so a bump's
-    top is about an eighth lower.
+    """Round bumps, h = height max(0, 1 - (r / radius)^2) at the distance r from a bump's centre.
+
+    The highest counts. Each square of side `spacing` has one, at a random position; none reaches
+    before `start`. The ground is interpolated smoothly on a grid, so a bump's top is about an
+    eighth lower.
     """
 
     place = "over obstacles"
@@ -520,11 +523,11 @@ class Obstacles(Relief):
     radius: Length = Field(gt=0)
     """Radius of a bump."""
     spacing: Length = Field(gt=0)
-    """Side of a square of the ground. Each square has one bump."""
+    """Side of a square of the ground, which has one bump."""
     seed: int = Field(ge=0, default=0)
-    """Seed of the random positions. The same seed gives the same ground."""
+    """Seed of the random positions."""
     start: Length | None = None
-    """Coordinate x where bumps begin; 1 in ahead of the robot if not given."""
+    """Coordinate x where bumps begin; by default 1 in ahead of the robot."""
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         cell, spacing = 0.5 * self.radius, self.spacing

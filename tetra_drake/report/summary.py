@@ -20,7 +20,6 @@ from tetra_drake.robot.remarks import (
     yielding_remark,
 )
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.metrics import (
     METRICS,
     UNITS,
@@ -29,6 +28,7 @@ from tetra_drake.scenario.metrics import (
     unmet_requirements,
 )
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.quantities import separate
 from tetra_drake.settings.section import value_at
 from tetra_drake.settings.units import Units
 

@@ -38,7 +38,7 @@ from tetra_drake.scenario.metrics import (
     headline_metric,
 )
 from tetra_drake.scenario.scenario import Scenario, scenario_of
-from tetra_drake.scenario.simulation import SimulationSection
+from tetra_drake.scenario.world import SimulationSection
 from tetra_drake.settings.section import Section
 
 if TYPE_CHECKING:

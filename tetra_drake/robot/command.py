@@ -14,13 +14,12 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError, check_positive, check_type, checked_numbers
 from tetra_drake.laws.cable import CableLaw, Curve
-from tetra_drake.robot.gait import Gait, check_parameters
+from tetra_drake.robot.gait import Gait, SteeringSignal, check_parameters
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.sensors import Sensors
+from tetra_drake.robot.sensors import Sensors, shown
 from tetra_drake.robot.signals import DrivenRobot, LoopLaw, Pilot
-from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.scenario.policies import DrivenRobots
 from tetra_drake.scenario.scenario import Scenario
 
@@ -200,11 +199,9 @@ def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
         arrays = [pilot.robots[2:] for pilot in some]
         together = DrivenRobots(*some[0].robots[:2], *_stacked(arrays))
         values = np.array([pilot.values for pilot in some])
-        shown = readings.rows(rows)
-        for row, pilot in enumerate(some):
-            if pilot.seen:
-                shown.put(row, pilot.seen(shown.rows(row).copied()))
-        given, shape = some[0].law(together, shown, values), signals[rows].shape
+        sensors = {row: pilot.seen for row, pilot in enumerate(some) if pilot.seen}
+        seen = shown(readings.rows(rows), sensors)
+        given, shape = some[0].law(together, seen, values), signals[rows].shape
         source = some[0].source
         signals[rows] = checked_numbers(given, shape, source=source, key="signals", finite=True)
     return signals

@@ -1,17 +1,27 @@
-"""Gait: numbers by name from which oscillators or a policy make the signals of a robot."""
+"""Gait: numbers by name from which oscillators or a policy make the signals of a robot. And
+steering of oscillators: a turn, or a function from time to the turn.
+"""
+
+from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import numbers
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.scenario.world import World
 
+if TYPE_CHECKING:
+    from tetra_drake.formatting import TextTable
+
 Body = tuple[tuple[str, float | str], ...]
 """Numbers of a robot: scenario keys, and values as texts with units, or as numbers without one."""
+
+SteeringSignal = Callable[[float], float]
+"""Function from time (s) to the turn, -1 to 1."""
 
 _MOST = 15
 """Largest number of parameters that are printed."""
@@ -39,16 +49,20 @@ class Gait:
         return f"<Gait {self.name}>"
 
     def _repr_html_(self) -> str:
+        from tetra_drake.formatting import heading_html
+
         return heading_html(self.name) + self._table.html()
 
     @property
     def _table(self) -> TextTable:
         """Table of the parameters, the turn unless it is 0, and the numbers of the body; of a long
         one the beginning."""
+        from tetra_drake.formatting import TextTable
+
         turn = {"turn": self.turn} if self.turn else {}
-        numbers = {**self.parameters, **turn, **dict(self.body)}
-        rows = [[name, _four_digits(value)] for name, value in numbers.items()][:_MOST]
-        more = [["...", f"{len(numbers) - _MOST} more"]] if len(numbers) > _MOST else []
+        found = {**self.parameters, **turn, **dict(self.body)}
+        rows = [[name, _four_digits(value)] for name, value in found.items()][:_MOST]
+        more = [["...", f"{len(found) - _MOST} more"]] if len(found) > _MOST else []
         return TextTable(["parameter", "value"], rows + more, (0, 1))
 
     def to_json(self, scenario: World) -> dict[str, Any]:
@@ -92,3 +106,21 @@ def check_parameters(
         found = f"found {len(given)}, expected the {len(expected)} of the scenario"
         raise InputError(source, key, f"{found}; {' and '.join(texts)}")
     return values
+
+
+def constant_steering(turn: float) -> SteeringSignal:
+    """Steering function that gives the same turn, -1 to 1, at all times; a positive turn raises the
+    input of left oscillators. Raises InputError unless the turn is a number; checked_turn() checks
+    its limits later."""
+    if isinstance(turn, bool) or not isinstance(turn, numbers.Real):
+        expected = "a number from -1 to 1, or a function of the time in s"
+        raise InputError("steering", "", f"found {turn!r}, expected {expected}")
+    return lambda time: turn
+
+
+def checked_turn(turn: float, *, time: float) -> float:
+    """The turn as a float. Raises InputError unless it is a number from -1 to 1; the message names
+    the `time` (s) for which a steering function gave it."""
+    if not isinstance(turn, numbers.Real) or not abs(turn) <= 1.0:
+        raise InputError("steering", f"at {time:g} s", f"found {turn!r:.60}, expected -1 to 1")
+    return float(turn)

@@ -11,10 +11,9 @@ import numpy.typing as npt
 from tetra_drake.errors import InputError, check_type, check_whole
 from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.robot.gait import Body, Gait, check_parameters
-from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.quantities import Quantity
+from tetra_drake.settings.quantities import Quantity, separate
 from tetra_drake.settings.section import written
 from tetra_drake.settings.units import given_quantity
 

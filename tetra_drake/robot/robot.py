@@ -7,7 +7,7 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import NoneType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from scipy import linalg
@@ -24,34 +24,17 @@ from tetra_drake.laws.model import Bodies, Model
 from tetra_drake.laws.oscillator import GaitParameter, Oscillators, steered_input
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.bodies import body_inertias
-from tetra_drake.robot.equilibrium import (
-    Equilibrium,
-    Unactuated,
-    damping_at_rest,
-    find_equilibrium,
-    mass_matrix,
-    stiffness_at_rest,
-)
-from tetra_drake.robot.gait import Gait, check_parameters
-from tetra_drake.robot.ground import lift, make_ground
-from tetra_drake.robot.start import pushed, started
-from tetra_drake.robot.steering import SteeringSignal, checked_turn
+from tetra_drake.robot.gait import Gait, SteeringSignal, check_parameters, checked_turn
+from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure, with_origins
-from tetra_drake.robot.struts import (
-    axial_forces,
-    check_apart,
-    elastic_struts,
-    elongated,
-    strut_contact_law,
-)
+from tetra_drake.robot.struts import check_apart, strut_contact_law
 from tetra_drake.scenario.events import Event, blueprint_after, up_to_each
 from tetra_drake.scenario.start import Push
 from tetra_drake.scenario.world import World
 
-MOST_CORRECTIONS = 100
-"""Largest number of corrections of the lengths of elastic struts, in the search for equilibrium."""
-SAME_LENGTH = 1e-10
-"""Change (m) of an elastic strut's length below which no further correction is made."""
+if TYPE_CHECKING:
+    from tetra_drake.robot.equilibrium import Equilibrium
+
 LIGHT, LEAST = 0.05, 1e-4
 """Damping ratios: below the first one damping is light; steps preserve the second one at least."""
 
@@ -87,13 +70,17 @@ class Robot:
                 terrain or with struts that overlap, or its start moves what is held.
         """
         scenario = scenario.with_sections(events=[]) if at_rest else scenario
-        placed = structure = _placed(scenario)
+        placed = structure = Structure.of(scenario.blueprint())
         check_apart(scenario, placed, may_overlap=at_rest)
         model = make_model(scenario.with_sections(terrain=Flat()), placed)
         start = None if at_rest else placed.start
         if placed.settles and (start is None or start.rest):
-            structure, model = _settled(scenario, placed, model)
+            from tetra_drake.robot.settling import settled
+
+            structure, model = settled(scenario, placed, model)
         if start:
+            from tetra_drake.robot.start import started
+
             structure = started(scenario, structure, start)
         if placed.offsets.any() and not at_rest:
             # Nothing moves along an axis that an anchor holds.
@@ -124,8 +111,9 @@ class Robot:
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
-                law = laws[number].items()
-                laws[number] = {k: x.scaled(0.0) if k == "curve" else 0.0 for k, x in law}
+                own = cable.CableLaw(**laws[number])
+                without = own.cut()._replace(free_length=0.0, intact=own.intact)
+                laws[number] = without._asdict()
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),
@@ -173,7 +161,7 @@ class Robot:
             return self.before.equilibrium
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
-        placed = _placed(self.scenario)
+        placed = Structure.of(self.scenario.blueprint())
         if placed.settles:
             return Robot.of(self.scenario, at_rest=True).equilibrium
         return equilibrium_of(self.scenario, placed)
@@ -197,6 +185,13 @@ class Robot:
         """
         if self.damping_ratio >= LIGHT:
             return np.inf
+        from tetra_drake.robot.equilibrium import (
+            Unactuated,
+            damping_at_rest,
+            mass_matrix,
+            stiffness_at_rest,
+        )
+
         aloft = Unactuated(self.model._replace(ground=Ground.nowhere()))
         damping = damping_at_rest(aloft, self.structure.initial_state)
         squares, modes = linalg.eigh(stiffness_at_rest(aloft).toarray(), mass_matrix(aloft))
@@ -340,49 +335,11 @@ class Phase:
         """States [q; v] (..., 13*bodies) at the beginning of this phase, from those at the end of
         the phase `before`. The nodes are at the same places, and move on unless they are pushed."""
         states = with_origins(states, self.p_BC - before.p_BC)
-        return pushed(states, self.robot.structure, self.push) if self.push else states
+        if not self.push:
+            return states
+        from tetra_drake.robot.start import pushed
 
-
-def _placed(scenario: World) -> Structure:
-    """The structure of a scenario's robot at the positions of its settings, before any search for
-    equilibrium. It has no contact nodes if the scenario has no ground."""
-    return Structure.of(scenario.blueprint())
-
-
-def _settled(scenario: World, placed: Structure, model: Model) -> tuple[Structure, Model]:
-    """Moves a structure into equilibrium on flat ground. Returns the moved structure and its model.
-
-    `placed` and `model` are the structure and its model at the positions of the settings. Elastic
-    struts become as long as their forces in equilibrium make them. The forces depend on the
-    lengths, so both are corrected alternately.
-    """
-    up = np.array([0.0, 0.0, lift(scenario, placed)])
-    structure = dataclasses.replace(placed, p_WB=placed.p_WB + up)
-    elongation, change = np.zeros(len(placed.struts)), np.inf
-    for _ in range(MOST_CORRECTIONS + 1):
-        equilibrium = find_equilibrium(
-            model, structure.initial_state, bodies=placed.bodies, source=scenario.name
-        )
-        poses = equilibrium.state[: 7 * len(placed.bodies)].reshape(-1, 7)
-        structure = dataclasses.replace(
-            structure, q_WB=poses[:, :4], p_WB=poses[:, 4:], equilibrium=equilibrium
-        )
-        if change < SAME_LENGTH or not elastic_struts(placed).size:
-            return structure, model
-
-        before = elongation
-        forces = axial_forces(structure, Unactuated(model), structure.initial_state)
-        elongation = forces / placed.strut_stiffness
-        change = np.abs(elongation - before).max()
-        structure = dataclasses.replace(structure, p_BN=elongated(placed, elongation))
-        model = model._replace(
-            p_BN=structure.p_BN,
-            struts=structure.strut_table,
-            strut_contact=strut_contact_law(scenario, structure),
-            bodies=model.bodies._replace(radius=structure.radius),
-        )
-    problem = "are too soft: their lengths find no equilibrium; give more axial_stiffness"
-    raise InputError(scenario.name, "robot.struts", problem)
+        return pushed(states, self.robot.structure, self.push)
 
 
 def equilibrium_of(
@@ -393,6 +350,8 @@ def equilibrium_of(
     The search begins at `start` (13*bodies,), a state [q; v], by default the structure's initial
     state. Raises InputError if there is no equilibrium.
     """
+    from tetra_drake.robot.equilibrium import find_equilibrium
+
     model = make_model(scenario.with_sections(terrain=Flat()), structure)
     start = structure.initial_state if start is None else start
     return find_equilibrium(model, start, bodies=structure.bodies, source=scenario.name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -57,3 +57,11 @@ class Sensors:
             before = self._first if step < latest and self._first else now
             self.recent, latest = [before] * longest, step
         self.recent = [*self.recent[step != latest :][:longest], now]
+
+
+def shown(exact: Readings, sensors: Mapping[int, Callable[[Readings], Readings]]) -> Readings:
+    """Readings of robots (N, ...) as their sensors show them, written into the exact ones.
+    `sensors` are by the row of their robot."""
+    for row, own in sensors.items():
+        exact.put(row, own(exact.rows(row)))
+    return exact

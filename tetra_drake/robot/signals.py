@@ -20,9 +20,8 @@ from tetra_drake.files import whole_file
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.matsuoka import NO_OSCILLATORS
 from tetra_drake.laws.oscillator import Oscillators, make_states, write_outputs
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import Gait, SteeringSignal
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.scenario.policies import DrivenRobots
 from tetra_drake.settings.plugins import origin
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.kinematics import P_WN, V_WN
-from tetra_drake.robot.structure import Structure, moved_nodes, rotated
+from tetra_drake.robot.structure import Structure, moved_nodes, rotated, turned_back
 from tetra_drake.scenario.start import BodyStart, Push, Start
 from tetra_drake.scenario.world import World
 
@@ -24,7 +25,11 @@ def started(scenario: World, structure: Structure, start: Start) -> Structure:
 
     own = [start.bodies.get(name, BodyStart()) for name in structure.bodies]
     whole, turns = start.rotation, [one.rotation for one in own]
-    turned = Rotation.concatenate(turns) * whole * Rotation.from_quat(structure.q_WB[:, _W_LAST])
+    turned = (
+        Rotation.concatenate(turns)
+        * whole
+        * Rotation.from_quat(np.roll(structure.q_WB, -1, axis=1))
+    )
     centre = structure.mass @ structure.p_WB / structure.mass.sum()
     arms = whole.apply(structure.p_WB - centre)
     w_WB = np.add(start.spin, [one.spin for one in own])
@@ -32,16 +37,13 @@ def started(scenario: World, structure: Structure, start: Start) -> Structure:
     moved = dataclasses.replace(
         structure,
         p_WB=centre + arms,
-        q_WB=turned.as_quat()[:, _W_FIRST],
+        q_WB=np.roll(turned.as_quat(), 1, axis=1),
         v_WB=np.hstack([w_WB, v_WB]),
     )
     if scenario.terrain.is_ground:
         moved.p_WB[:, 2] += max(0.0, _depth(moved) - max(0.0, _depth(structure)))
     _check_held(scenario, structure, moved)
     return moved
-
-
-_W_LAST, _W_FIRST = [1, 2, 3, 0], [3, 0, 1, 2]
 
 
 def _depth(structure: Structure) -> float:
@@ -76,9 +78,9 @@ def pushed(states: np.ndarray, structure: Structure, push: Push) -> np.ndarray:
     body = structure.carriers[node] if on_node else structure.bodies.index(push.on)
     p_BN = structure.p_BN[node] if on_node else np.zeros(3)
     q, v = states[..., 7 * body : 7 * body + 4], 7 * len(structure.bodies) + 6 * body
-    xx, yy, zz, xy, xz, yz = structure.mass[body] * structure.unit_inertia[body]
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    moment = np.cross(p_BN, rotated(q * [1.0, -1.0, -1.0, -1.0], np.array(push.impulse)))
+    moments = structure.mass[body] * structure.unit_inertia[body]
+    inertia = RotationalInertia(*moments).CopyToFullMatrix3()
+    moment = np.cross(p_BN, turned_back(q, np.array(push.impulse)))
     after = states.copy()
     if p_BN.any():
         after[..., v : v + 3] += rotated(

@@ -7,7 +7,7 @@ import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -26,8 +26,10 @@ from tetra_drake.laws import cable, kinematics
 from tetra_drake.laws.model import WORLD, AnchorSprings, Couplings, Joints, NodeLoads
 from tetra_drake.laws.struts import Struts
 from tetra_drake.robot.bodies import body_inertias, strut_pose
-from tetra_drake.robot.equilibrium import Equilibrium
 from tetra_drake.scenario.blueprint import Blueprint
+
+if TYPE_CHECKING:
+    from tetra_drake.robot.equilibrium import Equilibrium
 
 STRUT_COLOUR, NODE_COLOUR = (0.33, 0.55, 0.72, 1.0), (0.13, 0.15, 0.18, 1.0)
 PASSIVE_COLOUR, ACTUATED_COLOUR = (0.0, 0.62, 0.45, 1.0), (0.76, 0.09, 0.36, 1.0)
@@ -173,7 +175,8 @@ class Structure(Blueprint):
         """Springs that hold the nodes of ball joints together, for kernels."""
         node_a, node_b = self.joints.T.copy()
         body_a, body_b = self.carriers[node_a], self.carriers[node_b]
-        return Joints(node_a, node_b, body_a, body_b, self.joint_stiffness, self.joint_damping)
+        springs = self.joint_stiffness, self.joint_damping, self.joint_friction
+        return Joints(node_a, node_b, body_a, body_b, *springs)
 
     @property
     def loads(self) -> NodeLoads:
@@ -260,15 +263,10 @@ def rotated(q: np.ndarray, p: np.ndarray) -> np.ndarray:
     return np.asarray(p + scalar * turn + np.cross(vector, turn))
 
 
-def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:
-    """Rates (times, cables) of the cables' lengths in m/s, from positions and velocities of the
-    nodes (times, nodes, 3) in m and m/s."""
-    ends = structure.segments.ends
-    p_AB, v_AB = (x[:, ends[:, 1]] - x[:, ends[:, 0]] for x in (p_WN, v_WN))
-    rates = np.zeros((len(structure.cable_names), len(p_WN)))
-    of_pieces = (p_AB * v_AB).sum(axis=2) / np.linalg.norm(p_AB, axis=2)
-    np.add.at(rates, structure.segments.cable, of_pieces.T)
-    return rates.T
+def turned_back(q: np.ndarray, p_W: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) of the world in the frames of bodies with quaternions (..., 4), w first: the
+    inverse of rotated()."""
+    return rotated(q * [1.0, -1.0, -1.0, -1.0], p_W)
 
 
 def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:

@@ -150,6 +150,8 @@ class Blueprint:
     """Stiffness of the springs that hold the nodes of a joint together (joints,)."""
     joint_damping: np.ndarray = field(default_factory=lambda: np.zeros(0))
     """Damping of the springs that hold the nodes of a joint together (joints,)."""
+    joint_friction: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """Torque limits of the friction of the joints (joints,)."""
     given_inertia: Mapping[int, GivenInertia] = field(default_factory=dict)
     """Given mass, centre and inertia, by the index of the body."""
     markers: np.ndarray = field(default_factory=lambda: np.array([], dtype=int))
@@ -280,6 +282,13 @@ class Blueprint:
         groups = [set(cables) for cables in self.groups]
         images = [{image_of_cable[cable] for cable in cables} for cables in self.groups]
         return tuple(groups.index(cables) if cables in groups else None for cables in images)
+
+    @property
+    def rubbing(self) -> list[str]:
+        """Keys of the cables with friction at their rings, and of the joints with friction."""
+        laws = zip(self.cable_keys, self.cable_laws, strict=True)
+        joints = itertools.compress(self.joint_keys, self.joint_friction)
+        return [key for key, law in laws if law.get("mu")] + [*joints]
 
     def check(self) -> None:
         """Raises InputError, naming the key of the robot's settings, if it cannot be simulated."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetra_drake.scenario.events import Event
-from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.quantities import separate
 from tetra_drake.settings.section import value_at
 
 IterationSeed = tuple[int, int, int]

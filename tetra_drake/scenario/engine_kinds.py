@@ -35,23 +35,23 @@ class Drake(EngineSettings):
 
     module: ClassVar[str] = "tetra_drake.engines.drake"
     scheme: Literal["radau3", "runge_kutta3"] | None = None
-    """Integrator: implicit (radau3) or explicit (runge_kutta3). By default radau3 for up to 12
-    bodies; for n more it is runge_kutta3, unless dampers stop the fastest motion at a rate above 14
-    n² per second."""
+    """Implicit (radau3) or explicit (runge_kutta3) integrator. By default radau3 for n up to 12
+    bodies; for more runge_kutta3, unless dampers stop the fastest motion at a rate above 14 n² per
+    second. Where friction is nearly viscous, steps after a mode change are then explicit, too."""
     accuracy: float | None = Field(default=None, gt=0)
     """Target accuracy per step. By default half the least damping ratio of a cable, anchor or joint
     with the robot's mass, because longer steps of radau3 would damp vibrations: from 2e-5 to 0.005,
     or to 0.01 where friction is nearly viscous, as in the scenario thesis; to a tenth of this for
     robots with joints."""
     max_step: Time | None = Field(default=None, gt=0)
-    """Longest step. By default 8 ms, or 12 ms where friction is nearly viscous; less if that
-    damping ratio is below 0.05."""
+    """Longest step. By default 8 ms, or 12 ms where friction is nearly viscous; less if that ratio
+    is below 0.05."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
     """When a node may change its mode: at the end of steps, or where a witness function is zero.
-    `witness` needs short steps, such as the steps of runge_kutta3."""
+    `witness` needs short steps."""
     look_ahead: Time | None = Field(default=None, ge=0)
-    """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none. If not
-    given, 20 us; 0.3 ms where friction is nearly viscous."""
+    """Shortest step that ends at a predicted mode change; 0 for none. By default 20 us; 0.3 ms
+    where friction is nearly viscous."""
 
 
 class Compiled(EngineSettings):
@@ -60,9 +60,9 @@ class Compiled(EngineSettings):
 
     module: ClassVar[str] = "tetra_drake.engines.lanes.batch"
     tolerance: Speed | None = Field(default=None, gt=0)
-    """Permitted error per step of the velocity of a body; for rotations, of its strut tips. If not
-    given, 0.1 mm/s; 5 mm/s where friction is nearly viscous, as in the scenario thesis; a tenth of
-    it for robots with joints."""
+    """Permitted error per step of the velocity of a body; for rotations, of its strut tips. By
+    default 0.1 mm/s; 5 mm/s where friction is nearly viscous, as in the scenario thesis; a tenth
+    for robots with joints."""
     max_step: Time | None = Field(default=None, gt=SHORTEST_STEP, le=1)
     """Longest step. If not given, 3 ms; less where damping is light, as for !Drake."""
 
@@ -91,7 +91,7 @@ class Mujoco(EngineSettings):
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)
     has_cone: ClassVar[bool] = True
     step: Time = Field(default=0.0625e-3, ge=1e-7, le=1)
-    """Time step. A simulation fails at once if it is too long for springs and dampers."""
+    """Time step. One that is too long for springs and dampers fails at once."""
 
 
 EngineKind = Annotated[Drake | Compiled | Mujoco, Kinds(EngineSettings)]

@@ -26,13 +26,12 @@ class Event(Section):
     at: Time = Field(ge=0)
     """Time of the event."""
     cut: list[str] = Field(default=[])
-    """Names of cables that break, such as T1-T2 outer top or side n1 n2. A cut cable has no
-    tension, and its actuator turns freely."""
+    """Cables that break, such as T1-T2 outer top or side n1 n2. Their actuators turn freely."""
     lose: list[str] = Field(default=[])
     """Point masses that fall off: nodes in `masses` of a structure, or bodies with a `payload` of a
     row. The rest keeps its velocity."""
     change: Keyed[str, float | str] = Field(default={})
-    """New numbers by scenario key, such as friction.static, of the ground and its friction."""
+    """New numbers of the ground and its friction, by scenario key."""
     push: Push | None = Field(default=None, exclude_if=operator.not_)
     """Impulse that acts at once."""
 

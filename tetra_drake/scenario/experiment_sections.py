@@ -11,8 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, WithJsonSchema
 
-from tetra_drake.scenario.joined_keys import different_keys
-from tetra_drake.settings.quantities import Keyed, Time
+from tetra_drake.settings.quantities import Keyed, Time, different_keys
 from tetra_drake.settings.section import Section
 
 BodyBound = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})]
@@ -34,10 +33,10 @@ class EvolutionSection(Section):
     trials: int = Field(ge=1, le=1000)
     """Number of independent trials, each with another seed."""
     evaluations: int = Field(ge=1)
-    """Number of gaits that a trial evaluates, unless it ends early: for !SteadyState its
-    population, then two in each iteration."""
+    """Number of gaits that a trial evaluates at most: for !SteadyState its population, then two an
+    iteration."""
     time_budget: Time = Field(gt=0)
-    """Longest wall time of a simulation; one that takes longer counts as failed."""
+    """Longest CPU time of a simulation; beyond, it counts as failed."""
 
 
 Spread = Annotated[float, Field(gt=0, le=0.5)]
@@ -61,13 +60,13 @@ class Disturbances(Section):
     draws: int = Field(ge=1, le=10_000)
     """Number of draws."""
     spreads: Annotated[Keyed[str, Spread], AfterValidator(different_keys)] = Field(default={})
-    """Relative spreads by scenario key: a draw multiplies the number by a factor from 1 - spread to
-    1 + spread. Keys joined by commas get the same factor."""
+    """Relative spreads by scenario key: a draw multiplies the number by 1 - spread to 1 + spread.
+    Keys joined by commas get one factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)
     """Largest displacement of each body at t = 0 along x, y and up, as a share of the spacing of
-    tetrahedra, or of the shortest strut of a structure."""
+    tetrahedra, or of the shortest strut."""
     cuts: Cuts | None = Field(default=None, exclude_if=operator.not_)
     """Cables that break in each draw."""
     tail: float = Field(default=1.0, gt=0, le=1)
-    """Share of the draws, the worst ones and at least one, whose mean is a gait's fitness (the
-    conditional value at risk)."""
+    """Share of the draws, the worst and at least one, whose mean is the fitness (conditional value
+    at risk)."""

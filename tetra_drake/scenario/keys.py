@@ -41,7 +41,6 @@ _LIMITS = {
 _ABOUT_METRICS = """\
 `require` limits a cost from above, any other metric from below. Some metrics are of the named
 robots alone."""
-_LENGTHS = {"minItems": "≥ {} items", "maxItems": "≤ {} items"}
 
 
 def schema_text(*, structure: bool = False) -> str:
@@ -71,7 +70,7 @@ def keys_page() -> str:
     parts, others = [_INTRODUCTION], []
     schema = Scenario.model_json_schema()
     for key, node in schema["properties"].items():
-        items, told = node.get("items"), dict[str, tuple[str, str]]()
+        items, told = node.get("items"), dict[str, tuple[str, str, str]]()
         sections = [one for one in members_of(items or node, schema) if "$ref" in one]
         inner = f"{key}[0]" if items else key
         for section in sections:
@@ -93,25 +92,32 @@ def keys_page() -> str:
 
 
 def _list_of_keys(
-    rows: Iterable[tuple[str, Tree]], told: dict[str, tuple[str, str]], kind: str
+    rows: Iterable[tuple[str, Tree]], told: dict[str, tuple[str, str, str]], kind: str
 ) -> str:
-    """Keys of a kind of a section as a list. `told` has the kind that told a key with the same text
-    first, and its default there; the key is not told again, except for another default."""
-    lines, again = [], dict[str, list[str]]()
+    """Keys of a kind of a section as a list. `told` has the kind and the key that told a name with
+    the same text first, and its default there. The text is not told again, nor an equal default."""
+    lines, again, whole = [], dict[str, list[str]](), list[str]()
     for key, node in rows:
+        if any(key.startswith(f"{mapping}.") for mapping in whole):
+            continue
         default = json.dumps(node["default"]).replace('"', "") if "default" in node else ""
         if default in ("null", "[]", "{}"):
             default = "optional"
         elif default:
             default = f"default {default}" if "unit" in node else f"default `{default}`"
+        says_type = default and node.get("type") == "boolean"
         value, text = _value(node), " ".join(node["description"].split())
-        other, usual = told.setdefault(f"{key} {value} {text}", (kind, default))
-        if other == kind:
-            lines.append(f"- `{key}` ({'; '.join(filter(None, [value, default]))}): {text}")
-        else:
-            differs = f" ({default})" if default != usual else ""
-            again.setdefault(other, []).append(f"`{key}`{differs}")
-    lines += [f"- {listed(keys)}: as for `{first}`" for first, keys in again.items()]
+        name = key.rpartition(".")[2]
+        other, first, usual = told.setdefault(f"{name} {value} {text}", (kind, key, default))
+        if (other, first) == (kind, key):
+            about = filter(None, ["" if says_type else value, default])
+            lines.append(f"- `{key}` ({'; '.join(about)}): {text}")
+            continue
+        differs = f" ({default})" if default != usual else ""
+        source = other if first == key else first.rpartition(".")[0]
+        again.setdefault(source, []).append(f"`{key}`{differs}")
+        whole += [key] if first == key and value == "mapping" else []
+    lines += [f"- {listed(keys)}: as for `{source}`" for source, keys in again.items()]
     return "\n".join(lines)
 
 
@@ -129,7 +135,7 @@ def _value(node: Tree) -> str:
     words = unit or node.get("format") or _WORDS.get(str(node.get("type")), str(node.get("type")))
     if "items" in node:
         item = _value(node["items"])
-        item = f"({item})" if re.search(r",| or |×", item) else item
+        item = f"({item})" if re.search(r"[,×<>≤≥]| or | to ", item) else item
         if "minItems" in node and node["minItems"] == node.get("maxItems"):
             return f"{node['minItems']} × {item}"
         words = f"list of {item}"
@@ -138,8 +144,7 @@ def _value(node: Tree) -> str:
     limits = [text.format(plainest(node[n], unit)) for n, text in _LIMITS.items() if n in node]
     if {"minimum", "maximum"} <= node.keys():
         limits = [f"{plainest(node['minimum'], unit)} to {plainest(node['maximum'], unit)}"]
-    lengths = [text.format(node[n]) for n, text in _LENGTHS.items() if n in node]
-    return ", ".join([words, *limits, *lengths])
+    return ", ".join(filter(None, ["" if limits and words == "number" else words, *limits]))
 
 
 if __name__ == "__main__":

@@ -106,11 +106,11 @@ class WalkMetrics:
     distance: float = _of_poses(
         "m", "along x", lambda walk: walk.markers[2, 0, 0] - walk.markers[0, 0, 0]
     )
-    """Distance along x from the start to the end: displacement of x₁ (see Metrics)."""
+    """Displacement of x₁ along x from the start to the end."""
     steady_distance: float = _of_poses(
         "m", "without the start", lambda walk: walk.markers[2, 0, 0] - walk.markers[1, 0, 0]
     )
-    """Distance along x from `simulation.steady_from` to the end: Δx₁ of Eq. 10."""
+    """Displacement of x₁ along x from `simulation.steady_from` to the end: Δx₁ of Eq. 10."""
     speed: float = _of_poses("m/s", "of the centre", _mean_speed)
     """Mean speed of the centre of mass along x from `simulation.steady_from` on."""
     relative_speed: float = _of_poses(
@@ -118,8 +118,7 @@ class WalkMetrics:
         "body lengths per second",
         lambda walk: _mean_speed(walk) / walk.length if walk.length else math.nan,
     )
-    """Speed divided by the length of the robot, its largest extent along an axis at the start; NaN
-    for a point."""
+    """Speed divided by the robot's length, its largest extent along an axis at the start."""
     twist: float = _of_poses(
         "m",
         "one rear foot ahead of the other",
@@ -127,7 +126,7 @@ class WalkMetrics:
         needs=ROW,
         is_cost=True,
     )
-    """Distance along x between the two rear feet at the end: abs(x₁ - x₂)."""
+    """Distance along x between the rear feet at the end: abs(x₁ - x₂)."""
     lead: float = _of_poses(
         "m",
         "front tip ahead of rear foot",
@@ -145,18 +144,17 @@ class WalkMetrics:
     heading_change: float = metric(
         "rad", "left positive", lambda walk: walk.heading[-1] - walk.heading[0], needs=ROW
     )
-    """Angle by which the robot has turned to the left at the end. Whole turns count. See
-    robot.measures."""
+    """Angle by which the robot has turned to the left at the end, whole turns included."""
     path_curvature: float = metric(
         "1/m", "1 / radius, left positive", lambda walk: curvature(walk.path, scale=walk.scale)
     )
     """Curvature of the centre's path from `simulation.steady_from` on; positive if it bends left
-    along the motion, even if the robot walks backward."""
+    along the motion."""
     cost_of_transport: float = metric(
         "", "work / (weight x distance)", _cost_of_transport, is_cost=True
     )
-    """Actuator work divided by weight and by the centre's displacement over the ground, in the
-    steady stretch. The displacement counts as at least 1 mm. Infinite without gravity."""
+    """Actuator work divided by weight and by the centre's displacement over the ground (at least 1
+    mm), in the steady stretch. Infinite without gravity."""
     travelling_index: float = metric(
         "", "0: standing wave, 1: travelling", lambda walk: travelling_index(walk.signals)
     )
@@ -166,11 +164,12 @@ class WalkMetrics:
 
 @dataclass(frozen=True)
 class Metrics(TalliedMetrics, WalkMetrics):
-    """Metrics of a simulation, in SI units. T1's bottom left node is at x₁ and y₁, its bottom right
-    node at x₂, the tip of the front tetrahedron at x₃. Robots other than rows of tetrahedra have x₁
-    and y₁ at the centre of mass, here called the centre. The steady stretch begins at
-    `simulation.steady_from`, or at `cpg.start_up` if it is later, and lasts to the end. A metric
-    that does not apply to a robot is NaN.
+    """Metrics of a simulation, in SI units.
+
+    T1's bottom left node is at x₁ and y₁, its bottom right node at x₂, the front tip at x₃. Robots
+    other than rows of tetrahedra have x₁ and y₁ at the centre of mass, here called the centre. The
+    steady stretch goes from `simulation.steady_from`, or `cpg.start_up` if it is later, to the end.
+    A metric that does not apply to a robot is NaN.
     """
 
     lifted_shares: tuple[float, ...] = ()

@@ -35,7 +35,7 @@ class SteadyState(OptimizerSettings):
     population: int = Field(default=50, ge=2, le=MOST_GAITS)
     """Number of gaits in the population."""
     tournament: int = Field(default=5, ge=1, le=MOST_GAITS)
-    """Number of gaits that are drawn to select a parent, or the gait that a child replaces."""
+    """Number of gaits drawn to select a parent, or the gait that a child replaces."""
     crossover_probability: float = Field(default=0.2, ge=0, le=1)
     """Probability that two children swap a parameter."""
     mutation_probability: float = Field(default=0.7, ge=0, le=1)
@@ -47,8 +47,7 @@ class SteadyState(OptimizerSettings):
     tau_mutation_range: Time = Field(default=0.05, ge=0)
     """Largest change of tau_A in one mutation."""
     stop_rise: float = Field(default=0.03, ge=0)
-    """Least rise of the mean fitness in `stop_window` iterations. With a smaller rise, a trial ends
-    early."""
+    """Least rise of the mean fitness in `stop_window` iterations; with less a trial ends early."""
     stop_window: int = Field(default=100, ge=1)
     """Number of iterations for `stop_rise`."""
     stop_after: int = Field(default=200, ge=0)
@@ -56,21 +55,21 @@ class SteadyState(OptimizerSettings):
 
 
 class CmaEs(OptimizerSettings):
-    """Settings of covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772): gaits are drawn
-    from a normal distribution that adapts to the fittest. A search that has converged restarts
-    around its best gait, with twice the population; where it has stalled, a new one begins
+    """Settings of covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
+
+    Gaits are drawn from a normal distribution that adapts to the fittest. A search that has
+    converged restarts around its best gait, with twice the population; one that has stalled begins
     elsewhere.
     """
 
     population: int | None = Field(default=None, ge=4, le=MOST_GAITS)
-    """Number of vectors in an iteration. The default is 4 + 3 ln n, rounded down, for n
-    parameters."""
+    """Number of vectors in an iteration; by default 4 + 3 ln n, rounded down, for n parameters."""
     sample: int = Field(default=40, ge=0, le=MOST_GAITS)
-    """Size of the sample: the random gaits that are evaluated before each search."""
+    """Number of random gaits that are evaluated before each search."""
     starts: int = Field(default=5, ge=1, le=1000)
-    """Number of searches that are tried out, for 1,000 evaluations each and half of all at most;
-    the best continues. A search starts at the mean of the best quarter of its sample; without one,
-    in the middle of the ranges or at random gaits."""
+    """Number of searches that are tried, for 1,000 evaluations each and half of all at most; the
+    best continues. A search starts at the mean of the best quarter of its sample, or without one in
+    the middle of the ranges or at random."""
 
 
 class RandomSearch(OptimizerSettings):
@@ -81,10 +80,11 @@ CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
 class QualityDiversity(OptimizerSettings):
-    """Settings of a search for a map of two metrics with the fittest gait in each cell, by CMA-MAE
-    of pyribs (extra `qd`; Fontaine and Nikolaidis, arXiv 2205.10752). A cell's level of fitness
-    slowly follows its fittest gait; several runs of CMA-ES look for gaits above the level of their
-    cell.
+    """Settings of a search for a map of two metrics with the fittest gait in each cell.
+
+    By CMA-MAE of pyribs (extra `qd`; Fontaine and Nikolaidis, arXiv 2205.10752): a cell's level of
+    fitness slowly follows its fittest gait, and several runs of CMA-ES look for gaits above the
+    level of their cell.
     """
 
     module: ClassVar[str] = "tetra_drake.lab.elites.quality_diversity"
@@ -95,12 +95,11 @@ class QualityDiversity(OptimizerSettings):
         dict[str, list[float]],
         *by_name(UNITS, lambda x: Annotated[list[x], Field(min_length=2, max_length=2)]),
     ] = Field(default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]})
-    """Two metrics with their ranges on the map. Values outside belong to the cells at the edge."""
+    """Two metrics with their ranges on the map; cells at the edge also have what is outside."""
     cells: list[CellCount] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)
-    """Number of draws of disturbances. Each gait of the map is simulated in all draws at the
-    end."""
+    """Number of draws of disturbances; each gait of the map is simulated in all at the end."""
 
     @model_validator(mode="after")
     def _check(self) -> "QualityDiversity":

@@ -29,11 +29,12 @@ Reading = Literal[
 
 
 class RollingPolicy(PolicyKind):
-    """Policy that rolls a robot: each cable is shortened by the same polynomial in x and z, the
-    place of its middle in the world frame from the robot's centre, in units of half the first
-    strut. So the robot keeps its shape in the world frame while it rolls through it. A clock keeps
-    it from coming to rest. The parameters are the coefficients of 1, x, z, x², xz, z², sx and sz,
-    where s is the sine of the clock.
+    """Policy that rolls a robot: each cable is shortened by the same polynomial of its place.
+
+    The place is x and z of the cable's middle from the robot's centre, in the world frame, in units
+    of half the first strut. So the robot keeps its shape in the world while it rolls through it; a
+    clock keeps it from coming to rest. The parameters are the coefficients of 1, x, z, x², xz, z²,
+    sx and sz, where s is the sine of the clock.
     """
 
     tag = "Rolling"
@@ -41,7 +42,7 @@ class RollingPolicy(PolicyKind):
     clock: Time = Field(default=2.0, gt=0)
     """Period of the clock."""
     most: float = Field(default=0.5, gt=0, lt=1)
-    """Largest change of a free length, as a share of the free length."""
+    """Largest change of a free length, as a share of it."""
 
     def parameters(self, blueprint: Blueprint) -> Mapping[str, PolicyBounds]:
         return dict.fromkeys(["1", "x", "z", "x²", "xz", "z²", "sx", "sz"], (-1.0, 1.0))
@@ -67,9 +68,9 @@ class SensingPolicy(PolicyKind):
     """
 
     readings: list[Reading] = Field(default=["clock", "lengths", "normal_forces"], min_length=1)
-    """Readings that the policy gets; see the class Readings. `clock` is sine and cosine of a clock.
-    Lengths are changes since the start, as shares. Forces are in units of the robot's weight,
-    positions of nodes from the robot's centre in units of the first strut."""
+    """Readings that the policy gets (class Readings). `clock` is sine and cosine. Lengths are
+    changes since the start, as shares; forces in units of the weight; positions from the robot's
+    centre, in units of the first strut."""
     clock: Time = Field(default=1.0, gt=0)
     """Period of the clock."""
 
@@ -158,8 +159,7 @@ class PythonPolicy(PolicyKind):
     tag = "Python"
 
     function: str = Field(pattern=r"^[\w.]+:\w+$")
-    """Module and name of the function, such as my_module:my_policy. Modules in the working folder
-    are found."""
+    """Module and name of the function: my_module:my_policy, also from the working folder."""
     count: int = Field(ge=1, le=MOST_PARAMETERS)
     """Number of parameters."""
     bounds: Annotated[list[float], *PAIR] = Field(default=[-1.0, 1.0])

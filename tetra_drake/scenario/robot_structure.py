@@ -52,6 +52,7 @@ from tetra_drake.settings.quantities import (
     Position,
     Stiffness,
     Time,
+    Torque,
     quantity,
 )
 from tetra_drake.settings.refusals import described, hint, refuse
@@ -111,19 +112,17 @@ class StrutGroup(Section):
     diameter: Length = Field(gt=0)
     """Diameter of a strut."""
     density: Density = Field(ge=0)
-    """Density of struts and spheres. It may be 0 where other parts of the body have mass."""
+    """Density of struts and their spheres; 0 only where other parts of the body have mass."""
     node_diameter: Length = Field(ge=0)
-    """Diameter of the spheres; 0 for none. A node has one sphere, from its first strut in the
-    file."""
+    """Diameter of the spheres; 0 for none. A node's first strut in the file counts."""
     contact_radius: Length | None = Field(default=None, ge=0)
-    """Radius of the sphere about each end that touches the ground; by default the sphere's radius,
-    else the strut's; 0 for nodes that anchors hold along z. With 0 the ground acts on the nodes."""
+    """Radius of the sphere about each end that touches the ground; 0 for points. By default the
+    sphere's, else the strut's; 0 where an anchor holds along z."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
-    """Axial force per shortening of a strut, E A / l; none for rigid struts. A strut without load
-    is as long as its nodes are apart in the file. Its force shortens it in equilibrium, and natural
-    frequencies include its stiffness, not the inertia of its elongation: if it is 17, 3.3 or 1
-    times as stiff as its cable, the first is 0.25, 1.2 or 4 % higher than with finite-element rods,
-    the second 0.75, 3.7 or 12 %. In motion it keeps its length."""
+    """Axial force per shortening, E A / l; none for rigid struts. Without load a strut is as long
+    as in the file. Its stiffness counts in equilibrium and in natural frequencies, the inertia of
+    its elongation does not: the first two frequencies are 0.75 % too high at most if it is 17 times
+    as stiff as its cable, 12 % if as stiff. In motion it keeps its length."""
 
 
 class SphereGroup(Section):
@@ -135,10 +134,10 @@ class SphereGroup(Section):
     diameter: Length = Field(gt=0)
     """Diameter of a sphere."""
     density: Density = Field(ge=0)
-    """Density of a sphere. It may be 0 where other parts of the body have mass."""
+    """Density of a sphere; 0 only where other parts of the body have mass."""
     contact_radius: Length | None = Field(default=None, ge=0)
-    """Radius with which a sphere touches the ground; by default its own. The default is 0 for nodes
-    that anchors hold along z."""
+    """Radius with which a sphere touches the ground. By default its own; 0 where an anchor holds
+    along z."""
 
 
 class CurveTable(Section):
@@ -167,8 +166,11 @@ class CableGroup(Section):
     """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
     default is 1 ms times its stiffness."""
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
-    """The nodes that each cable joins. A cable such as [a, b, c] runs over frictionless rings at
-    its inner nodes, with one tension."""
+    """The nodes of each cable. [a, b, c] runs over a ring at b."""
+    mu: float = Field(default=0.0, ge=0, le=2, exclude_if=operator.not_)
+    """Coefficient of friction at rings: over an angle theta, tensions have the ratio exp(mu theta)
+    in slip. Then the law's tension, which is shown, is the mean along the cable. What friction
+    holds creeps, with up to about 1 mm/s. A winch is at the last node of its path."""
     stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
     """Tension per elongation. Only a string or a curve needs none."""
     string: bool = Field(default=False, exclude_if=operator.not_)
@@ -190,15 +192,14 @@ class CableGroup(Section):
     max_stretch: Length | None = Field(default=None, gt=0, exclude_if=operator.not_)
     """Greatest stretch of a cable's spring. A tension above its tension there is told."""
     free_length: Length | None = Field(default=None, ge=0)
-    """Length without tension. A group has a free length or a tension."""
+    """Length without tension. A group has this or a tension."""
     tension: ForceQuantity | None = Field(default=None, ge=0)
     """Tension at the given coordinates of the nodes."""
     factors: Keyed[
         Literal["stiffness", "damping", "free_length", "tension"],
         list[Annotated[float, Field(gt=0)]],
     ] = Field(default={}, exclude_if=operator.not_)
-    """Factors of a number for each cable, in the order of `pairs`, such as `stiffness: [1, 0.98,
-    1.01]`."""
+    """Factors of a number for each cable, in the order of `pairs`: `stiffness: [1, 0.98, 1.01]`."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> CableGroup:
@@ -209,6 +210,8 @@ class CableGroup(Section):
             refuse("curve", "found another law beside it, expected the curve alone")
         if self.string and (self.initial_tension or self.quadratic or self.cubic):
             refuse("string", "found a law of a spring beside it, expected stiffness at most")
+        if self.mu and all(len(path) == 2 for path in self.pairs):
+            refuse("mu", "found no ring in pairs, expected a path such as [a, b, c]")
         needed = {"stiffness": not (self.curve or self.string), "damping": not self.string}
         needed |= {"free_length": self.string and self.stiffness is None}
         for key, is_needed in needed.items():
@@ -237,6 +240,7 @@ class CableGroup(Section):
         curve = Curve.of_spring(stiffness, table=table, **more)
         law: dict[str, Any] = {"damping": STRING_TIME * stiffness if damping is None else damping}
         law |= {"stiffness": stiffness} | ({"curve": curve} if curve.pieces else {})
+        law |= {"mu": self.mu} if self.mu else {}
         if free_length is None:
             own_law = CableLaw(**law, free_length=distance)
             free_length = distance - elastic_stretch(group.tension or 0.0, own_law)
@@ -251,8 +255,9 @@ class BallJoint(Section):
     stiffness: Stiffness | None = Field(default=None, gt=0)
     """Force per distance of the two nodes; by default `joint_stiffness`."""
     time_constant: Time = Field(default=1e-3, ge=0)
-    """Ratio of damping to stiffness. With less than 1 ms, a stiff joint vibrates, and steps are
-    short."""
+    """Ratio of damping to stiffness. Below 1 ms stiff joints vibrate, and steps are short."""
+    friction: Torque = Field(default=0.0, ge=0, exclude_if=operator.not_)
+    """Torque limit of dry friction. What it holds creeps, with up to about 0.01 rad/s."""
 
 
 class JoinedBody(Section):
@@ -260,7 +265,7 @@ class JoinedBody(Section):
     inertia may be given; what is not given follows from its parts."""
 
     struts: list[str] = Field(default=[])
-    """Groups of struts, such as cage, or single struts by group and nodes, such as cage a b."""
+    """Groups of struts, such as cage, or single struts, such as cage a b."""
     nodes: list[str] = Field(default=[])
     """Further nodes of the body, which need no strut."""
     mass: Mass | None = Field(default=None, gt=0)
@@ -269,8 +274,8 @@ class JoinedBody(Section):
     """Centre of mass [x, y, z] where the nodes are as in the file."""
     inertia: Annotated[list[InertiaQuantity], Field(min_length=3, max_length=6)] | None = None
     """Moments of inertia [xx, yy, zz], or also the matrix's products xy, xz, yz (xy is the integral
-    of -x y dm), about the centre of mass, along the axes of the file. By default the parts' inertia
-    in proportion to the mass."""
+    of -x y dm), about the centre of mass, along the file's axes. By default the parts' inertia in
+    proportion to the mass."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> JoinedBody:
@@ -306,8 +311,7 @@ class StructureFile(RobotSettings):
     format: Literal[1] = Field(default=1, exclude=True)
     """Version of the format of the file."""
     nodes: Keyed[Name, Coordinates] = Field(max_length=MOST_NODES)
-    """Coordinates [x, y, z] of each node, near an equilibrium. A node that nothing else names is
-    left out."""
+    """Coordinates [x, y, z], near an equilibrium. A node that nothing names is left out."""
     unit: str | None = None
     """Unit of coordinates that are bare numbers, such as cm. A robot in mm is shown in mm."""
     struts: Keyed[Name, StrutGroup] = Field(default={})
@@ -316,27 +320,25 @@ class StructureFile(RobotSettings):
     joints: Keyed[Name, BallJoint] = Field(default={})
     pinned: list[str] = Field(default=[], exclude=True)
     """Nodes at which ball joints hold struts together; elsewhere struts that share a node are one
-    body. Each body but the first gets a copy of the node, such as n-2, and a joint of this name."""
+    body. Each body but the first gets a copy, n-2, and a joint of this name."""
     joint_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness of pinned nodes, and of joints that give none. The default is the same as for
-    anchors."""
+    """Stiffness of pinned nodes, and of joints that give none; by default as for anchors."""
     bodies: Keyed[Name, JoinedBody] = Field(default={})
     actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
-    """Names of the cables that each oscillator drives, such as side a b. The nodes in a name may
-    have either order."""
+    """Cables of each oscillator, such as side a b, nodes in either order."""
     masses: Keyed[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
-    as a payload that cables hold."""
+    as a payload."""
     loads: Keyed[str, Annotated[list[ForceQuantity], Field(min_length=3, max_length=3)]] = Field(
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
-    """Axes along which the world holds nodes, such as xyz: nodes of struts by a spring and a
-    damper, others are fixed."""
+    """Axes along which the world holds nodes, such as xyz; nodes of struts by a spring and a
+    damper."""
     anchor_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness that holds a node of a strut along each axis of its anchor. The default follows the
-    robot: 1000 times the stiffness of all cables, or more for its weight; see FORMAT.md."""
+    """Stiffness of the anchor of a strut's node, along each axis. By default it follows from cables
+    and weight: see FORMAT.md."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness of an anchor; as for joints."""
     contacts: Literal["all"] | list[str] = "all"
@@ -344,16 +346,14 @@ class StructureFile(RobotSettings):
     gravity: Acceleration = Field(default=9.80665, ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
-    its anchors."""
+    """Displacement [x, y, z] of each body at t = 0, but for the axes of its anchors."""
     start: Start | None = Field(default=None, exclude_if=operator.not_)
     """How the robot is turned and moves at t = 0; at rest if there is none."""
     ignored: list[str] | None = None
-    """Settings of an imported file that have no effect, such as friction; noted when the file is
-    read."""
+    """Settings of an imported file that have no effect, such as friction."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key, such as `cables.side.stiffness: 2 %` or `nodes: 1
-    mm`; or in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
+    """Tolerances of numbers of the robot by key: `cables.side.stiffness: 2 %`, `nodes: 1 mm`; also
+    in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.
@@ -441,6 +441,7 @@ class StructureFile(RobotSettings):
         laws, paths, limits = [], [], []
         for cable in cables:
             is_backward = body_of[cable.nodes[0]] > body_of[cable.nodes[-1]]
+            is_backward &= not self.cables[cable.group].mu  # a winch is at the last node
             path = cable.nodes[::-1] if is_backward else cable.nodes
             places = [self.nodes[node] for node in path]
             length = sum(itertools.starmap(math.dist, itertools.pairwise(places)))
@@ -472,6 +473,7 @@ class StructureFile(RobotSettings):
             "joints": np.array(pairs, dtype=int).reshape(-1, 2),
             "joint_keys": tuple(f"joints.{name}" for name in self.joints),
             "joint_damping": np.array([joint.time_constant for joint in joints]),
+            "joint_friction": np.array([joint.friction for joint in joints]),
         }
 
     def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> dict[str, Any]:

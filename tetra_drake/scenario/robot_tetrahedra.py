@@ -67,7 +67,7 @@ class RowCables(Section):
     """Damping coefficient of a cable: tension divided by the rate of its length."""
 
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
-    """Stiffness of outer cables, which join base nodes of the same name."""
+    """Stiffness of outer cables, which join base nodes of one name."""
     inner_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of inner cables, from a tip to base nodes."""
     free_length: Length = Field(ge=0)
@@ -79,8 +79,8 @@ class RowCables(Section):
         """Constants (SI) of the force law of one cable of a junction, such as "outer top", by the
         names of laws.cable.CableLaw."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
-        own = {"damping": self.damping, "free_length": self.free_length}
-        return own | {"stiffness": stiffness}
+        free_length, damping = self.free_length, self.damping
+        return {"stiffness": stiffness, "damping": damping, "free_length": free_length}
 
 
 Spacing = Annotated[float, *quantity("m", balanced=0.0)]
@@ -105,23 +105,23 @@ class Tetrahedra(RobotSettings):
     """Density of struts and spheres."""
     cables: RowCables
     spacing: Annotated[Spacing, Varied()] = Field(ge=0)
-    """Distance between base triangles at t = 0. `balanced` (or 0): where the cables balance, as in
-    a file that changes its base's strut length, or cables' stiffness or free length."""
+    """Distance between base triangles at t = 0. `balanced` (or 0): where the cables balance; also
+    where a file changes its base's strut length, or cables' stiffness or free length."""
     gravity: Acceleration = Field(ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
+    """Displacement [x, y, z] of each tetrahedron at t = 0."""
     start: Start | None = Field(default=None, exclude_if=operator.not_)
     """How the robot is turned and moves at t = 0; at rest if there is none."""
     payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
-    """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
+    """Point mass at the centre of each tetrahedron, such as its motors."""
     contacts: Literal["thesis", "all"] = "thesis"
-    """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
-    foremost tip, which reach flat ground. `all`: all four."""
+    """Nodes that the ground can touch. `thesis`: the bottom nodes and the foremost tip, which reach
+    flat ground. `all`: all four of every tetrahedron."""
     actuation: list[Annotated[list[CableName], Field(min_length=1)]] = Field(
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )
-    """Groups of a junction's cables that share an oscillator, the same for every junction."""
+    """Groups of a junction's cables that share an oscillator."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
     """Tolerances of numbers of the robot by key, such as `cables.outer_stiffness: 2 %`."""
 

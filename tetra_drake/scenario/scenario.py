@@ -23,7 +23,6 @@ from tetra_drake.scenario.experiment_sections import (
     Disturbances,
     EvolutionSection,
 )
-from tetra_drake.scenario.joined_keys import different_keys, separate
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.tolerances import (
@@ -34,7 +33,7 @@ from tetra_drake.scenario.tolerances import (
 )
 from tetra_drake.scenario.world import World
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
-from tetra_drake.settings.quantities import by_name
+from tetra_drake.settings.quantities import by_name, different_keys, separate
 from tetra_drake.settings.refusals import TAG, described, hint, refuse
 from tetra_drake.settings.section import value_at, written
 from tetra_drake.settings.units import plainest, shortest
@@ -55,19 +54,18 @@ class Scenario(World):
 
     gait_bounds: GaitBounds
     evolve: Annotated[BodyBounds, Field(exclude_if=operator.not_)] = Field(default={})
-    """Bounds of numbers of the robot that evolve with the gait, by scenario key, such as
-    `robot.cables.side.stiffness: [50 N/m, 400 N/m]`, or `robot.nodes.n3[2]` for a coordinate z.
-    Keys joined by commas get the same value. Equal bounds fix a number. A file replaces all bounds
-    of its base."""
+    """Bounds of numbers of the robot that evolve with the gait, by scenario key:
+    `robot.cables.side.stiffness: [50 N/m, 400 N/m]`, `robot.nodes.n3[2]` for a coordinate z. Keys
+    joined by commas get one value; equal bounds fix it. A file replaces all bounds of its base."""
     objective: Annotated[dict[str, float], *by_name(_OF_WEIGHTS), Field(min_length=1)]
-    """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
-    Lengths count in inches. A file replaces its base's objective as a whole."""
+    """Weights of metrics, such as `speed: 2 s/in`; evolution maximises the weighted sum. Lengths
+    count in inches. A file replaces its base's objective."""
     require: Annotated[dict[str, float], *by_name(UNITS)] = Field(default={})
-    """Limits of metrics: a gait that does not meet one counts as failed. A file replaces all limits
-    of its base."""
+    """Limits of metrics; a gait beyond one counts as failed. A file replaces all limits of its
+    base."""
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers besides the robot's, by scenario key, such as `ground.stiffness: 20 %
-    uniform`; or in the text of a number: `20 kN/m ± 20 %`."""
+    """Tolerances of numbers besides the robot's, by scenario key: `ground.stiffness: 20 %
+    uniform`."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()

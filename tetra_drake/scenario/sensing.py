@@ -15,9 +15,14 @@ UNITS = {"lengths": "m", "rates": "m/s", "tensions": "N", "normal_forces": "N"}
 UNITS |= {"q_WB": "rad", "w_WB": "rad/s", "p_WN": "m", "v_WN": "m/s"}
 """Units of the errors of readings, by the names of the readings; see robot.readings.Readings."""
 
-_PLUS: Any = lambda number: Annotated[number, Field(ge=0)]  # noqa: E731
-Errors = Annotated[dict[str, float], *by_name(UNITS, _PLUS)]
-Delays = Annotated[dict[str, float], *by_name(dict.fromkeys(UNITS, "s"), _PLUS)]
+
+def _positive(number: Any) -> Any:
+    """The type of a number that is not negative."""
+    return Annotated[number, Field(ge=0)]
+
+
+Errors = Annotated[dict[str, float], *by_name(UNITS, _positive)]
+Delays = Annotated[dict[str, float], *by_name(dict.fromkeys(UNITS, "s"), _positive)]
 
 
 class Sensing(Section):

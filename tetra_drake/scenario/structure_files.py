@@ -8,25 +8,21 @@ from pathlib import Path
 from typing import Any
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import write_whole
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.scenario.shipped import named_structure, shipped_scenarios, structure_names
+from tetra_drake.scenario.shipped import named_structure, structure_names
 from tetra_drake.scenario.structure_graph import members
-from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
+from tetra_drake.scenario.yaml_text import read_mapping
 from tetra_drake.settings.refusals import TAG, described, no_such
-from tetra_drake.settings.section import Tree, keys_of, written
+from tetra_drake.settings.section import Tree, keys_of
 
 _LOG = logging.getLogger("tetra_drake")
 _KIND = StructureFile.tag
 
-_XML = (".xml", ".mjcf")
+XML_SUFFIXES = (".xml", ".mjcf")
 """Suffixes of MuJoCo's files."""
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 """Keys that occur only in files of NTRT."""
-SCENARIO_KEYS = {"base", "robot"}
-"""Keys that distinguish the files: each scenario file has one of them, and no structure file has
-any."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
@@ -41,43 +37,6 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
         raise InputError(name_or_file, "", problem)
     content = _content(file)
     return structure_of(content | ({"unit": unit} if unit else {}), file)
-
-
-def save_structure(structure: StructureFile, path: Path, *, source: str) -> None:
-    """Writes a structure file with all digits. Its first line names the `source` of the structure.
-    Raises InputError if the file cannot be written."""
-    text = dump_yaml({"format": 1} | written(structure.model_dump(exclude_defaults=True)))
-    name = " ".join(Path(source).name.split())
-    write_whole(path, f"# Converted from {name} by tetra-drake.\n{text}")
-
-
-def names_scenario(name_or_file: str | Path) -> bool:
-    """True if a name or a file means a scenario. A name that a scenario and a structure share means
-    the structure."""
-    name = str(name_or_file)
-    if name in structure_names() or not os.path.isfile(name):
-        return name in shipped_scenarios() and name not in structure_names()
-    if Path(name).suffix.lower() in _XML:
-        return False
-    return not SCENARIO_KEYS.isdisjoint(_read(Path(name)))
-
-
-def foreign_format(name_or_file: str | Path) -> str:
-    """Name of the software whose format a file has, "MuJoCo" or "NTRT"; empty for a structure, a
-    scenario or no file. Raises InputError if the file cannot be read."""
-    file = Path(name_or_file)
-    if file.suffix.lower() in _XML:
-        return "MuJoCo"
-    if str(file) in {*structure_names(), *shipped_scenarios()} or not os.path.isfile(file):
-        return ""
-    return "" if KEYS_OF_NTRT.isdisjoint(_read(file)) else "NTRT"
-
-
-def _read(file: Path) -> Tree:
-    """Content of a YAML file that holds a structure, a scenario or a structure of NTRT. Raises
-    InputError for any other content."""
-    keys = [*keys_of(StructureFile), *SCENARIO_KEYS, *KEYS_OF_NTRT]
-    return read_mapping(file, "structure file", keys=keys)
 
 
 def structure_file(name: str, folder: Path) -> Path:
@@ -123,7 +82,7 @@ def structure_of(content: Any, file: Path) -> StructureFile:
 
 def _content(file: Path) -> Tree:
     """Content of a structure file. Raises InputError for a file of other software."""
-    if file.suffix.lower() in _XML:
+    if file.suffix.lower() in XML_SUFFIXES:
         raise _foreign(file, "MuJoCo")
     keys = [*keys_of(StructureFile), *KEYS_OF_NTRT]
     content = read_mapping(file, "structure file", keys=keys)

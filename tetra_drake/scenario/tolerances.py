@@ -12,8 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from tetra_drake.on_demand import loaded
-from tetra_drake.scenario.joined_keys import different_keys
-from tetra_drake.settings.quantities import Keyed
+from tetra_drake.settings.quantities import Keyed, different_keys
 from tetra_drake.settings.refusals import Tree, joined
 from tetra_drake.settings.section import Section, tree_value
 from tetra_drake.settings.units import PATTERN, PLUS_MINUS, plain
@@ -40,15 +39,15 @@ class Tolerance(Section):
     mm uniform` or `2 % each`."""
 
     size: str
-    """Standard deviation of a normal law, or half the width of a uniform one: a share, such as `2
-    %`, or a quantity, such as `1 mm`. 0 for an exact number."""
+    """Standard deviation of a normal law, or half the width of a uniform one: a share, `2 %`, or a
+    quantity, `1 mm`."""
     law: Literal["normal", "uniform"] = "normal"
     """Law of the error."""
     each: bool = False
-    """True if each cable, strut or number has an error of its own, as from machining; otherwise all
-    have one in common, as from a supplier. Coordinates always have their own."""
+    """True if each cable, strut or number has an error of its own, as coordinates always have;
+    otherwise all have one in common."""
     source: str = "assumed"
-    """Where the tolerance is from, such as a paper or a data sheet."""
+    """Where the tolerance is from, such as a data sheet."""
 
 
 def _also_short(schema: Tree) -> None:

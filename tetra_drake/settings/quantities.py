@@ -6,6 +6,7 @@ and mappings may have such types, too.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
 
@@ -20,6 +21,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
+from tetra_drake.errors import InputError
 from tetra_drake.settings.refusals import described
 from tetra_drake.settings.units import OTHER_SIGNS, PATTERN, PLUS_MINUS, plainest, quantity_to_si
 
@@ -84,6 +86,7 @@ Speed = Annotated[float, *quantity("m/s")]
 InverseSpeed = Annotated[float, *quantity("s/m")]
 Acceleration = Annotated[float, *quantity("m/s^2")]
 ForceQuantity = Annotated[float, *quantity("N")]
+Torque = Annotated[float, *quantity("N*m")]
 Stiffness = Annotated[float, *quantity("N/m")]
 Damping = Annotated[float, *quantity("N*s/m")]
 DampingPerLength = Annotated[float, *quantity("N*s/m^2")]
@@ -148,3 +151,18 @@ def by_name(
         WrapValidator(in_order),
         Field(json_schema_extra=EMPTY),
     )
+
+
+def separate(joined: str) -> list[str]:
+    """Splits a key that joins scenario keys by commas: "cpg.gain, robot.density" gives two keys."""
+    return [key.strip() for key in joined.split(",")]
+
+
+def different_keys(by_joined: Mapping[str, Value], *, source: str = "") -> Mapping[str, Value]:
+    """Checks a mapping whose keys may each name several scenario keys, such as "a.b, c.d", and
+    returns it. Raises InputError, naming `source`, if a scenario key occurs twice."""
+    counts = Counter(key for joined in by_joined for key in separate(joined))
+    for key, count in counts.items():
+        if count > 1:
+            raise InputError(source, key, "is given twice")
+    return by_joined

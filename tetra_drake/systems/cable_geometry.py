@@ -19,7 +19,13 @@ from pydrake.geometry import (
     SourceId,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import Context, LeafSystem_, SystemScalarConverter
+from pydrake.systems.framework import (
+    Context,
+    DiagramBuilder,
+    LeafSystem_,
+    System,
+    SystemScalarConverter,
+)
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from tetra_drake.robot.structure import PASSIVE_COLOUR
@@ -86,6 +92,27 @@ class Cylinders(NamedTuple):
     length: float
     """Length (m) of each cylinder."""
     frames: list[FrameId]
+
+
+def AddCableGeometry(
+    builder: DiagramBuilder,
+    scene_graph: SceneGraph,
+    cables: System,
+    pieces: Mapping[str, Sequence[float]],
+) -> None:
+    """Shows the cables of a CableNetwork in a scene. `pieces` has the lengths (m) of each cable's
+    straight pieces at the start, by the name of the cable."""
+    lengths = {
+        name if len(each) == 1 else f"{name} {number}": length
+        for name, each in pieces.items()
+        for number, length in enumerate(each, 1)
+    }
+    source = scene_graph.RegisterSource(cables.get_name())
+    cylinders = RegisterCylinders(scene_graph, source, lengths=lengths)
+    name = f"{cables.get_name()}_geometry"
+    shown = builder.AddNamedSystem(name, CableGeometry_[float](cylinders))
+    builder.Connect(cables.GetOutputPort("ends"), shown.get_input_port())
+    builder.Connect(shown.get_output_port(), scene_graph.get_source_pose_port(source))
 
 
 def RegisterCylinders(

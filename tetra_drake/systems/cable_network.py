@@ -37,7 +37,6 @@ from tetra_drake.systems.attachment import (
     check_part,
     numbers_for_each,
 )
-from tetra_drake.systems.cable_geometry import CableGeometry_, RegisterCylinders
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
@@ -68,7 +67,7 @@ class CableNetwork(ConvertibleSystem):
     loop. Where the model is `slack`, a cable goes slack instead of pushing. A cable whose ends meet
     does not pull; see laws.cable.MEETING.
 
-    With `parameters`, the constants of the cables are parameters of the context (4*cables,): each
+    With `parameters`, the constants of the cables are parameters of the context (5*cables,): each
     number of laws.cable.CableLaw for all cables, one after the other, then the rows of their
     curves, if any; see SetLaw().
     """
@@ -212,8 +211,8 @@ class Cable:
     law: cable.CableLaw
     """Its constants in SI units."""
     rings: tuple[Frame, ...] = ()
-    """Frames at whose origins the cable runs over frictionless rings, from a to b. The cable has
-    one tension along its whole path."""
+    """Frames at whose origins the cable runs over rings, from a to b. Without friction, `law.mu`,
+    it has one tension along its whole path."""
 
     @property
     def path(self) -> tuple[Frame, ...]:
@@ -308,18 +307,9 @@ def AddCables(
         builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
         builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
     if scene_graph is not None and names:
-        named = zip(names, pieces, strict=True)
-        of_pieces = {
-            one if len(each) == 1 else f"{one} {number}": length
-            for one, each in named
-            for number, length in enumerate(each, 1)
-        }
-        source = scene_graph.RegisterSource(name)
-        cylinders = RegisterCylinders(scene_graph, source, lengths=of_pieces)
-        shown = builder.AddNamedSystem(f"{name}_geometry", CableGeometry_[float](cylinders))
-        builder.Connect(network.GetOutputPort("ends"), shown.get_input_port())
-        poses = scene_graph.get_source_pose_port(source)
-        builder.Connect(shown.get_output_port(), poses)
+        from tetra_drake.systems.cable_geometry import AddCableGeometry
+
+        AddCableGeometry(builder, scene_graph, network, dict(zip(names, pieces, strict=True)))
     return network
 
 

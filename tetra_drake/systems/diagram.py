@@ -28,10 +28,9 @@ from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.matsuoka import Matsuoka
 from tetra_drake.laws.oscillator import Oscillators
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import Gait, SteeringSignal
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.steering import SteeringSignal
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.attachment import Attach
@@ -41,7 +40,6 @@ from tetra_drake.systems.ground_contact import AddGroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
 from tetra_drake.systems.oscillator_cpg import OscillatorCpg
 from tetra_drake.systems.start_up_gate import StartUpGate
-from tetra_drake.systems.state_forces import StateForces
 from tetra_drake.systems.steering import Steering
 
 
@@ -180,6 +178,8 @@ def MakeTensegrityDiagram(
     model = robot.model
     held = model.anchors.nodes.size or model.joints.node_a.size or model.loads.nodes.size
     if model.strut_contact.acts or held:
+        from tetra_drake.systems.state_forces import StateForces  # the thesis's robot has none
+
         Attach(builder, plant, builder.AddNamedSystem("state_forces", StateForces(robot)))
 
     state = plant.get_state_output_port()

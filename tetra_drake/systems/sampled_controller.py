@@ -28,7 +28,7 @@ class HeldSignals(ConvertibleSystem):
 
     After Hold(), the output changes linearly from the old signals to the new ones, within one
     network step, the scenario's `cpg.listing_step` (s). Only at t = 0 it changes at once. Commands
-    and the actions of engines.simulation.Simulation act in the same way.
+    and the actions of lab.stepping.simulation.Simulation act in the same way.
 
     The discrete state (2m + 1,) is the m signals before the latest change, the m signals after it,
     and the time (s) of its beginning. At the start both are the robot's first signals. The output

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from tetra_drake.robot.steering import checked_turn
+from tetra_drake.robot.gait import checked_turn
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 

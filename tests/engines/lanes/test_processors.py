@@ -31,14 +31,9 @@ for name in shipped_scenarios():
 
 def run(command: list[str], cache: Path, **environment: str) -> str:
     """What a Python command prints that compiles kernels of its own, in the folder `cache`."""
-    environment = os.environ | environment | {"NUMBA_CACHE_DIR": str(cache)}
-    done = subprocess.run(
-        [sys.executable, *command],
-        env=environment,
-        cwd=TESTS.parent,
-        capture_output=True,
-        text=True,
-    )
+    given = {"env": os.environ | environment | {"NUMBA_CACHE_DIR": str(cache)}}
+    given |= {"cwd": TESTS.parent, "capture_output": True, "text": True}
+    done = subprocess.run([sys.executable, *command], **given)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -54,22 +54,6 @@ def test_solves_what_it_was_made_of(graph):
     np.testing.assert_allclose(x, np.linalg.solve(matrix, right_side), rtol=1e-9, atol=1e-12)
 
 
-def test_a_row_of_bodies_fills_nothing_in():
-    schedule = Schedule.of(*GRAPHS["row"])
-    assert list(schedule.blocks) == GRAPHS["row"][1]
-    assert not schedule.target.size
-
-
-def test_bodies_are_eliminated_in_their_order_unless_another_needs_fewer_products():
-    for graph in ("row", "all coupled", "six-bar"):
-        np.testing.assert_array_equal(
-            Schedule.of(*GRAPHS[graph]).order, np.arange(GRAPHS[graph][0])
-        )
-    star = Schedule.of(*GRAPHS["star"])
-    assert star.order[0] != 0
-    assert not star.target.size
-
-
 def test_a_large_lattice_fills_little_in():
     side = 20
     right = [(i, i + 1) for i in range(side**2) if (i + 1) % side]

@@ -16,12 +16,13 @@ from tetra_drake.kernels.compiling import compiled, inlined, merged
 from tetra_drake.kernels.lanes import Real, Table, any_lane, named, select
 from tetra_drake.laws import contact, inertia
 from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
-from tetra_drake.laws.forces import Forces
+from tetra_drake.laws.dry_friction import DAMPING, spin_friction
+from tetra_drake.laws.forces import Forces, joint_spin, put_slip_slopes
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
 from tetra_drake.laws.model import WORLD, Joints, Model, carriers_of
 from tetra_drake.laws.terrain import to_world
-from tetra_drake.laws.vectors import cross, dot, put_vector, vector_at
+from tetra_drake.laws.vectors import Vector3, cross, dot, put_vector, vector_at
 
 CABLES_AT_ONCE = 6
 """Number of cables of a pair of bodies whose damping is summed at once."""
@@ -96,7 +97,7 @@ class Solver(NamedTuple):
         return robot._replace(
             couplings=couplings._replace(first=first, second=second),
             cables=cables._replace(node_a=node_a, node_b=node_b),
-            joints=Joints(*nodes, *bodies, joints.stiffness, joints.damping),
+            joints=Joints(*nodes, *bodies, *joints[4:]),
         )
 
 
@@ -208,7 +209,7 @@ def implicit_matrix(
         k = time * (c_x + time * k_x), time * (c_y + time * k_y), time * (c_z + time * k_z)
         add_diagonal(forces.nodes, anchors.nodes[i], anchors.carriers[i], k, blocks)
     if robot.joints.node_a.size or robot.cables.routes.nodes.size:
-        add_joints_and_routes(robot, solver, forces, time, blocks)
+        add_joints_and_routes(robot, solver, state, forces, time, blocks)
 
 
 @inlined
@@ -278,13 +279,14 @@ def add_cables(
 
 @functools.partial(compiled, nogil=True)  # a call of its own: inlined, it slows other robots
 def add_joints_and_routes(
-    robot: Model, solver: Solver, forces: Forces, time: Real, blocks: Table
+    robot: Model, solver: Solver, state: Table, forces: Forces, time: Real, blocks: Table
 ) -> None:
-    """Adds joints, as time * damping + time² * stiffness, and the damping of routed cables, as time
-    * damping * l lᵀ, to the implicit matrix `blocks`. `time` is in s.
+    """Adds joints, as time * damping + time² * stiffness, and the damping of routed cables and of
+    the friction at their rings, as time * damping * l lᵀ, to the implicit matrix `blocks`. `time`
+    is in s.
 
     A body's part of l is the sum of (p x s, s) over its nodes on the path, at p from its origin,
-    with the derivative s of the cable's length by the node's position.
+    with the derivative s of the cable's length, or of the slip at a ring, by the node's position.
     """
     joints, nodes = robot.joints, forces.nodes
     for i in range(joints.node_a.size):
@@ -292,27 +294,43 @@ def add_joints_and_routes(
         add_diagonal(nodes, joints.node_a[i], joints.body_a[i], (k, k, k), blocks)
         add_diagonal(nodes, joints.node_b[i], joints.body_b[i], (k, k, k), blocks)
         add_joint(nodes, joints.node_a[i], joints.node_b[i], solver.jointed[i], k, blocks)
-    routes, pair = robot.cables.routes, 0
+        if any_lane(joints.friction[i] > 0.0):
+            w = joint_spin(robot, state, i)
+            per_spin, less = spin_friction(w, joints.friction[i])
+            for r in range(3):
+                for c in range(3):
+                    added = time * ((per_spin if r == c else 0.0) - less * w[r] * w[c])
+                    blocks[joints.body_a[i], r, c] += added
+                    blocks[joints.body_b[i], r, c] += added
+                    blocks[solver.jointed[i], r, c] -= added
+    routes, rings, pair = robot.cables.routes, forces.rings, 0
     for i in range(robot.couplings.first_cable[solver.coupled.size], robot.cables.signal.size):
-        damping = time * forces.cable_forces[i, TENSION_PER_RATE]
-        for a in range(routes.first[i], routes.first[i + 1]):
-            for b in range(routes.first[i], routes.first[i + 1]):
-                block = solver.routed[pair]
-                pair += 1
-                if block < 0:
-                    continue
-                l_a, l_b = of_path(forces, routes.nodes[a], a), of_path(forces, routes.nodes[b], b)
-                is_own = block < robot.bodies.mass.size
-                for r in range(BLOCK):
-                    for c in range(r if is_own else 0, BLOCK):
-                        blocks[block, r, c] += damping * l_a[r] * l_b[c]
+        first, last = routes.first[i], routes.first[i + 1] - 1
+        rubs, begins = any_lane(robot.cables.law.mu[i] > 0.0), pair
+        for ring in range(first, last if rubs else first + 1):  # at first the length
+            slopes, damping = forces.route_slopes, forces.cable_forces[i, TENSION_PER_RATE]
+            if ring > first:
+                slopes, damping = forces.slip_slopes, rings[ring, DAMPING]
+                put_slip_slopes(first, ring, last, forces)
+            damping, pair = time * damping, begins
+            for a in range(first, last + 1):
+                for b in range(first, last + 1):
+                    block = solver.routed[pair]
+                    pair += 1
+                    if block < 0:
+                        continue
+                    l_a = of_path(forces, routes.nodes[a], vector_at(slopes, a, 0))
+                    l_b = of_path(forces, routes.nodes[b], vector_at(slopes, b, 0))
+                    is_own = block < robot.bodies.mass.size
+                    for r in range(BLOCK):
+                        for c in range(r if is_own else 0, BLOCK):
+                            blocks[block, r, c] += damping * l_a[r] * l_b[c]
 
 
 @inlined
-def of_path(forces: Forces, node: int, k: int) -> tuple[Real, ...]:
-    """Part of a node in the rate of a routed cable's length: its product with the velocity of the
-    node's body. `k` is the row of the node in `forces.route_slopes`."""
-    slope = vector_at(forces.route_slopes, k, 0)
+def of_path(forces: Forces, node: int, slope: Vector3) -> tuple[Real, ...]:
+    """Part of a node in the rate of a routed cable's length, or in a slip: its product with the
+    velocity of the node's body. `slope` is the derivative by the node's position."""
     return *cross(vector_at(forces.nodes, node, P_BN_W), slope), *slope
 
 

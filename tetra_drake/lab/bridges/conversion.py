@@ -6,10 +6,11 @@ from collections.abc import Collection
 from pathlib import Path
 
 from tetra_drake.errors import InputError
+from tetra_drake.lab.bridges.formats import foreign_format
 from tetra_drake.lab.bridges.mjcf import mjcf_tree
 from tetra_drake.lab.bridges.ntrt import ntrt_tree
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.scenario.structure_files import foreign_format, structure_of
+from tetra_drake.scenario.structure_files import structure_of
 from tetra_drake.settings.units import given_quantity
 
 

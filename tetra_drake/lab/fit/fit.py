@@ -22,7 +22,6 @@ from tetra_drake.figures.style import (
     line_style,
     name_panel,
     page_of,
-    save_findings,
     titled,
 )
 from tetra_drake.files import check_folder, given_path, read_bytes
@@ -30,7 +29,7 @@ from tetra_drake.formatting import Say, TextTable, fixed, listed, rounded, silen
 from tetra_drake.lab.fit.measurements import FitFile, Measurement, files_of
 from tetra_drake.lab.fit.placement import unknowns_of
 from tetra_drake.lab.fit.problem import KEPT_EVALUATIONS, STEP, Bounds, FitProblem, parameter_of
-from tetra_drake.lab.page import write_page
+from tetra_drake.lab.page import save_findings, write_page
 from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario

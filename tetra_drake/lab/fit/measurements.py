@@ -31,7 +31,6 @@ from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.joined_keys import different_keys
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import read_mapping
 from tetra_drake.settings.quantities import (
@@ -42,6 +41,7 @@ from tetra_drake.settings.quantities import (
     Length,
     Position,
     Time,
+    different_keys,
 )
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Kinds, Section, keys_of

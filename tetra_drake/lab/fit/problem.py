@@ -19,9 +19,8 @@ from tetra_drake.formatting import Say
 from tetra_drake.lab.fit.measurements import Measured, Prediction
 from tetra_drake.lab.predict.variates import variates_of
 from tetra_drake.lab.study.sweep import with_joined_changes
-from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.quantities import Quantity
+from tetra_drake.settings.quantities import Quantity, separate
 from tetra_drake.settings.section import Tree, value_at
 from tetra_drake.settings.units import given_quantity
 

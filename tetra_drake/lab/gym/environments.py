@@ -47,9 +47,9 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.engines.simulation import Simulation, is_list
-from tetra_drake.engines.states import States
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
+from tetra_drake.lab.stepping.simulation import Simulation, is_list
+from tetra_drake.lab.stepping.states import States
 from tetra_drake.results.result import SimulationResult, poses_of
 from tetra_drake.robot.command import checked_actions
 from tetra_drake.robot.readings import Readings, pitch_rates

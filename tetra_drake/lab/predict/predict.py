@@ -30,12 +30,11 @@ from tetra_drake.figures.style import (
     name_panel,
     page_of,
     page_width,
-    save_findings,
     titled,
 )
 from tetra_drake.files import given_path
 from tetra_drake.formatting import TextTable, fixed, rounded
-from tetra_drake.lab.page import write_page
+from tetra_drake.lab.page import save_findings, write_page
 from tetra_drake.lab.predict.variates import Variate, variates_of
 from tetra_drake.lab.study.equilibrium import EquilibriumStudy, study_equilibrium
 from tetra_drake.lab.study.statistics import json_rows

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tetra_drake.scenario.joined_keys import separate
 from tetra_drake.scenario.tolerances import Tolerance
-from tetra_drake.settings.quantities import Quantity
+from tetra_drake.settings.quantities import Quantity, separate
 from tetra_drake.settings.refusals import Tree, hint, joined, refuse
 from tetra_drake.settings.section import value_at
 from tetra_drake.settings.units import quantity_to_si

@@ -24,7 +24,7 @@ from tetra_drake.robot.command_file import command_text, load_command, table_tex
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.remarks import stillness_remark
-from tetra_drake.robot.structure import length_rates
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
 
 COMMAND, EXPECTED, LIMITS_FILE = "command.csv", "expected.csv", "limits.csv"
@@ -133,7 +133,7 @@ def actuator_loads(result: SimulationResult) -> Loads:
     walk = trajectory.isel(cable=robot.driven)
     law, length, tension = CableLaw.of(cables), walk.length.values, walk.tension.values
     signal = trajectory.signal.values[:, cables["signal"]]
-    rate = length_rates(robot.structure, trajectory.p_WN.values, trajectory.v_WN.values)
+    rate = _length_rates(robot.structure, trajectory.p_WN.values, trajectory.v_WN.values)
     rate = rate[:, robot.driven]
     driven = actuator.DrivenCables(law, signal, length, rate, tension, walk.free_length.values)
 
@@ -196,3 +196,14 @@ def _distance(result: SimulationResult) -> str:
     units = result.scenario.units
     distance = fixed(result.metrics.distance / units.length, units.decimals + 1)
     return f"{distance} {units.length_name}"
+
+
+def _length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:
+    """Rates (times, cables) of the cables' lengths in m/s, from positions and velocities of the
+    nodes (times, nodes, 3) in m and m/s."""
+    ends = structure.segments.ends
+    p_AB, v_AB = (x[:, ends[:, 1]] - x[:, ends[:, 0]] for x in (p_WN, v_WN))
+    rates = np.zeros((len(structure.cable_names), len(p_WN)))
+    of_pieces = (p_AB * v_AB).sum(axis=2) / np.linalg.norm(p_AB, axis=2)
+    np.add.at(rates, structure.segments.cable, of_pieces.T)
+    return rates.T

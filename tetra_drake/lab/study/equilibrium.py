@@ -19,6 +19,8 @@ from scipy.spatial.transform import Rotation
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
+from tetra_drake.lab.bridges.formats import names_scenario
+from tetra_drake.lab.study.statics import Statics, find_statics
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.capsules import NoStrutContact
@@ -37,15 +39,15 @@ from tetra_drake.robot.equilibrium import (
 from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.remarks import BEARS, overload_remark, sinking_remark, yielding_remark
 from tetra_drake.robot.robot import Robot, equilibrium_of
-from tetra_drake.robot.statics import Statics, find_statics
+from tetra_drake.robot.settling import axial_forces, elastic_struts, elongated
 from tetra_drake.robot.structure import Structure, node_motions, node_positions
-from tetra_drake.robot.struts import MEETING, condensed, overlaps
+from tetra_drake.robot.struts import MEETING, overlaps
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
-from tetra_drake.scenario.structure_files import names_scenario, read_structure
+from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.settings.refusals import no_such
 from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
 
@@ -59,6 +61,9 @@ as a share of the size of the robot."""
 _NOISE = 1e-9
 """Forces of anchors, and negative squares of frequencies, up to this share of the greatest are
 rounding errors."""
+
+_ELONGATION = 1e-6
+"""Elongation of a strut for finite differences, as a share of its length."""
 
 _SURROUNDINGS = "prism"
 """Shipped scenario with the ground and friction for structure files."""
@@ -142,12 +147,18 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         >>> tensions, heights = study.cables.tension, study.nodes.z
 
     Args:
-        given: a scenario, its name or file, or a run; or a robot.
+        given: a scenario, its name or file, or a run; a structure file (see robot_of_structure());
+            or a robot.
 
     Raises:
         InputError: if the robot has no equilibrium.
     """
-    robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
+    if isinstance(given, Robot):
+        robot = given
+    elif isinstance(given, (str, Path)) and os.path.isfile(given) and not names_scenario(given):
+        robot = robot_of_file(str(given))
+    else:
+        robot = Robot.of(given_scenario(given))
     structure, equilibrium = robot.structure, robot.equilibrium
     unactuated, p_WN = Unactuated(robot.model), node_positions(structure, equilibrium.state)
     force_at_rest(unactuated, equilibrium.state)
@@ -180,7 +191,7 @@ def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.nda
     force_at_rest(unactuated, state)
     rigid = stiffness_at_rest(unactuated).toarray()
     free, mass = free_motions(unactuated, state), mass_matrix(unactuated)
-    stiffness, momenta = condensed(rigid, robot.structure, unactuated, state), mass @ free
+    stiffness, momenta = _condensed(rigid, robot.structure, unactuated, state), mass @ free
     above = 2.0 * np.trace(np.linalg.solve(mass, stiffness))  # twice the sum of all squares
     lift = above * momenta @ np.linalg.solve(free.T @ momenta, momenta.T)
     return stiffness + lift, mass, len(mass) - free.shape[1]
@@ -301,6 +312,8 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     remarks = [sinking_remark(robot), yielding_remark(robot)]
     remarks.append(overload_remark(robot, study.cables["tension"].to_numpy()))
     lines = ["Its `start` is not at rest."] if structure.start else []
+    if structure.rubbing:
+        lines.append("Friction at rings and in joints is left out: it holds robots near this pose.")
     lines += [sentence(told) for told in remarks if told]
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
@@ -395,3 +408,34 @@ def _swinging(study: EquilibriumStudy, motions: np.ndarray) -> np.ndarray:
     poses[:, 4:] += ways
     states[:-1, : 7 * bodies] = poses.reshape(len(states) - 1, -1)
     return states
+
+
+def _condensed(
+    stiffness: np.ndarray, structure: Structure, unactuated: Unactuated, state: np.ndarray
+) -> np.ndarray:
+    """Stiffness matrix (6*n, 6*n) in N/m with the compliance of the elastic struts (static
+    condensation). `unactuated` is the same robot with its arrays of forces.
+
+    `stiffness` is the matrix of the n bodies as if rigid, from stiffness_at_rest(), in the
+    equilibrium `state` (13*n,). The elongations of the struts have no inertia: they follow the
+    displacements of the bodies at once.
+    """
+    elastic = elastic_struts(structure)
+    if not elastic.size:
+        return stiffness
+    coupling, own = np.empty((len(stiffness), elastic.size)), np.empty((elastic.size, elastic.size))
+    lengths = structure.strut_table.length
+    for column, strut in enumerate(elastic):
+        ends = []
+        for sign in (-1.0, 1.0):
+            elongation = np.zeros(len(lengths))
+            elongation[strut] = sign * _ELONGATION * lengths[strut]
+            p_BN = elongated(structure, elongation)
+            longer = Unactuated(unactuated.model._replace(p_BN=p_BN))
+            axial = axial_forces(structure, longer, state)[elastic]
+            ends.append((force_at_rest(longer, state), axial))
+        step = 2.0 * _ELONGATION * lengths[strut]
+        coupling[:, column] = (ends[0][0] - ends[1][0]) / step
+        own[:, column] = (ends[0][1] - ends[1][1]) / step
+    own += np.diag(structure.strut_stiffness[elastic])
+    return np.asarray(stiffness - coupling @ np.linalg.solve(own, coupling.T))

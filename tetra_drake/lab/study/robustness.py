@@ -28,11 +28,11 @@ from tetra_drake.figures.style import (
     name_panel,
     page_of,
     page_width,
-    save_findings,
     titled,
     write_beside,
 )
 from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
+from tetra_drake.lab.page import save_findings
 from tetra_drake.lab.study.statistics import interval, json_rows, share_interval
 from tetra_drake.machine import versions
 from tetra_drake.results.result import SimulationResult

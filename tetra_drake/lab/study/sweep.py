@@ -15,10 +15,10 @@ from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.scenario.changes import given_changes
-from tetra_drake.scenario.joined_keys import different_keys, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.quantities import different_keys, separate
 from tetra_drake.settings.section import Section, value_at
 
 if TYPE_CHECKING:

@@ -10,19 +10,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 from scipy.sparse import csr_array
 
 from tetra_drake.laws.kinematics import rigid_motions
+from tetra_drake.robot.equilibrium import soft_space
 from tetra_drake.scenario.blueprint import Segments
 
 TOLERANCE = 1e-6
 """Singular values below this share of the greatest, or of a bound for it, count as zero. Lengths
 are in units of the structure's size. Coordinates need at least six digits."""
-
-
-_WIDER = 100.0
-"""Pivots of a Cholesky factorisation up to so many times an eigenvalue may belong to it."""
 
 
 class Statics(NamedTuple):
@@ -90,24 +86,6 @@ def find_statics(
     products = (spins @ spins.T).toarray()
     uncounted = np.linalg.matrix_rank(products, tol=TOLERANCE**2, hermitian=True) if idle else 0
     return Statics(self_stresses.T, mechanisms=int(allowed.shape[1] - rank - uncounted))
-
-
-def soft_space(matrix: np.ndarray, least: float) -> np.ndarray:
-    """Orthonormal basis (n, vectors), in columns, of a symmetric matrix (n, n): of the eigenvectors
-    whose eigenvalues are at most `least` in size.
-
-    A Cholesky factorisation with pivoting finds a space that contains them nearly. It takes a
-    thirtieth of the time of an eigenvalue decomposition.
-    """
-    size = len(matrix)
-    factor, pivots, rank, _ = linalg.lapack.dpstrf(matrix, tol=_WIDER * least)
-    stiff, soft = pivots[:rank] - 1, pivots[rank:] - 1
-    space = np.zeros((size, size - rank))
-    space[stiff] = -linalg.solve_triangular(factor[:rank, :rank], factor[:rank, rank:])
-    space[soft] = np.eye(size - rank)
-    space = linalg.qr(space, mode="economic")[0]
-    eigenvalues, vectors = linalg.eigh(space.T @ matrix @ space)
-    return np.asarray(space @ vectors[:, np.abs(eigenvalues) <= least])
 
 
 def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:

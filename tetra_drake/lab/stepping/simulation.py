@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from tetra_drake.engines.engine import check_engine
 from tetra_drake.engines.lanes.batch import LaneBatch
-from tetra_drake.engines.states import States
 from tetra_drake.errors import (
     InputError,
     SimulationFailure,
@@ -24,13 +23,14 @@ from tetra_drake.errors import (
     check_whole,
     checked_numbers,
 )
+from tetra_drake.lab.stepping.states import States
 from tetra_drake.laws.cable import NUMBERS, CableLaw
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import checked_actions, checked_period, controlled_robot
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.sensors import Sensors
+from tetra_drake.robot.sensors import Sensors, shown
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.events import Event, check_taken
@@ -143,10 +143,7 @@ class Simulation:
 
     def _seen(self) -> Readings:
         """What the sensors of all robots show now; without a section `sensing`, the state."""
-        seen = self.state
-        for place, sensors in self._sensors.items():
-            seen.put(place, sensors(seen.rows(place).copied()))
-        return seen
+        return shown(self.state, self._sensors)
 
     @property
     def ended(self) -> np.ndarray:

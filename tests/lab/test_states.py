@@ -7,9 +7,9 @@ import pytest
 from helpers.actuations import WINCH
 from helpers.converged import shortly
 
-from tetra_drake.engines.simulation import Simulation
-from tetra_drake.engines.states import States
 from tetra_drake.errors import Diverged
+from tetra_drake.lab.stepping.simulation import Simulation
+from tetra_drake.lab.stepping.states import States
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 

@@ -13,8 +13,8 @@ from helpers.actuations import FORCE, MOTOR, WINCH
 
 from tetra_drake.engines.lanes.batch import LaneThread, processor_lanes
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import Diverged, InputError
+from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.experiment_sections import Disturbances
@@ -146,14 +146,6 @@ def test_the_last_period_ends_with_the_simulation(short):
     simulation = Simulation(short.with_changes({"simulation.duration": "0.25 s"}))
     times = [float(readings.time[0]) for readings in go(simulation, np.zeros((13, 1, 8)))]
     assert times[-2:] == [0.24, 0.25] and simulation.ended.all()
-
-
-def test_the_digits_of_a_robot_depend_neither_on_others_nor_on_threads(short):
-    scenario = short.with_changes(WINCH)
-    one, alone = (Simulation(scenario, count=9, workers=workers) for workers in (1, 9))
-    actions = drawn_actions(one)
-    for ours, theirs in zip(go(one, actions), go(alone, actions), strict=True):
-        assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
 
 
 def test_after_an_interrupt_a_reset_makes_the_robots_whole(short, monkeypatch, refused):

@@ -1,0 +1,1 @@
+"""Robots that a Python program steps, saves, copies and damages."""
