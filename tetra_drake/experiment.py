@@ -92,11 +92,12 @@ def evolve(
     for name, value, least in (("seed", seed, 0), ("workers", workers, 1)):
         if value is not None:
             check_whole("evolve", name, value, least=least)
-    for name, value in {"optimizer": optimizer, "objective": objective}.items():
-        check_type("evolve", name, value, Callable, NoneType)
+    for name, function in (("optimizer", optimizer), ("objective", objective)):
+        check_type("evolve", name, function, Callable, NoneType)
     flags = {"resume": resume, "overwrite": overwrite, "reevaluate": reevaluate, "report": report}
-    for name, value in (flags | {"progress": progress}).items():
-        check_type("evolve", name, value, bool, NoneType, *[Progress] * (name == "progress"))
+    for name, flag in flags.items():
+        check_type("evolve", name, flag, bool, NoneType)
+    check_type("evolve", "progress", progress, bool, Progress, NoneType)
     make_executor = maker_of(executor)
     if progress is True:
         progress = Progress(sys.stdout)

@@ -210,8 +210,8 @@ def linearize(
     """
     robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
     size = 13 * len(robot.structure.bodies)
-    given = robot.equilibrium.state if state is None else state
-    at = checked_numbers(given, (size,), source="linearize", key="state", finite=True)
+    start = robot.equilibrium.state if state is None else state
+    at = checked_numbers(start, (size,), source="linearize", key="state", finite=True)
     poses = at[: size // 13 * 7].reshape(-1, 7)
     structure = dataclasses.replace(robot.structure, q_WB=poses[:, :4], p_WB=poses[:, 4:])
     robot = dataclasses.replace(robot, structure=structure)
