@@ -90,6 +90,13 @@ def check_type(source: object, key: str, value: object, *kinds: Any) -> None:
         raise InputError(source, key, f"found {value!r:.60}, expected {expected}")
 
 
+def check_positive(source: object, key: str, number: Any) -> None:
+    """Raises InputError, naming `source` and `key`, unless a number is finite and above 0."""
+    check_type(source, key, number, numbers.Real)
+    if not 0.0 < number < math.inf:
+        raise InputError(source, key, f"found {number}, expected a number above 0")
+
+
 def checked_numbers(
     given: npt.ArrayLike, *shapes: tuple[int, ...], source: str, key: str, finite: bool = False
 ) -> np.ndarray:

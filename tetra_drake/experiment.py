@@ -97,12 +97,10 @@ def evolve(
     flags = {"resume": resume, "overwrite": overwrite, "reevaluate": reevaluate, "report": report}
     for name, flag in flags.items():
         check_type("evolve", name, flag, bool, NoneType)
+    check_type("evolve", "progress", progress, bool, Progress, NoneType)
     make_executor = maker_of(executor)
     if progress is True:
         progress = Progress(sys.stdout)
-    if not isinstance(progress, Progress | None) and progress is not False:
-        problem = f"found {progress!r}, expected True or an evolution.progress.Progress"
-        raise InputError("evolve", "progress", problem)
     if resume and overwrite:
         raise InputError("evolve", "overwrite", "excludes resume")
     out, progress = given_path(out, "evolve", "out"), progress or Progress()

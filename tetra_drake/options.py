@@ -52,8 +52,8 @@ class Parser(argparse.ArgumentParser):
         for function in functions:
             name = function.__name__.removeprefix("_")
             # Without docstrings (python -OO) there is no help.
-            parts = (inspect.getdoc(function) or "\n\n" * 3).split("\n\n")
-            what, description, about, example = parts
+            text = inspect.getdoc(function) or "\n\n" * 3
+            what, description, about, example = text.split("\n\n")
             command = commands.add_parser(
                 name,
                 help=what.rstrip("."),

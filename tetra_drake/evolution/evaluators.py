@@ -122,8 +122,7 @@ def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterato
         except RuntimeError as error:
             problem = f"takes no more tasks; the run can be resumed: {error}"
             raise InputError("executor", "", problem) from error
-        if not isinstance(future, Future):
-            raise InputError("executor", "", f"submit() gave {future!r:.60}, expected a Future")
+        check_type("executor", "submit()", future, Future)
         running.add(future)
         future.add_done_callback(running.discard)
         return future

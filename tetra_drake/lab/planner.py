@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import logging
 import math
-import numbers
 import time
 from collections.abc import Callable, Mapping, Sequence
 from types import NoneType
@@ -18,7 +17,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.errors import InputError, check_type, check_whole, checked_numbers
+from tetra_drake.errors import (
+    InputError,
+    check_positive,
+    check_type,
+    check_whole,
+    checked_numbers,
+)
 from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.lab.stepping.states import States
 from tetra_drake.laws.actuator import limits_of
@@ -124,9 +129,7 @@ class Planner:
         pause = step if decision_period is None else decision_period
         given = {"horizon": horizon, "temperature": temperature, "noise": noise}
         for key, number in (given | {"decision_period": pause, "control_period": step}).items():
-            check_type(source, key, number, numbers.Real)
-            if not 0.0 < number < math.inf:
-                raise InputError(source, key, f"found {number}, expected a number above 0")
+            check_positive(source, key, number)
         self._cost, self._temperature, self._noise = cost, temperature, noise
         self._period, self._delayed, self._decision_period = step, delayed, pause
         self._steps, self._ahead = math.ceil(horizon / step - 1e-6), round(pause / step)
@@ -152,10 +155,10 @@ class Planner:
             self.limits = np.stack([known.min(axis=0), known.max(axis=0)])
         if limits is not None:
             shape = self.limits.shape
-            own = checked_numbers(limits, shape, (2, 1), source=source, key="limits")
+            own = checked_numbers(limits, shape, (2, 1), source=source, key="limits", finite=True)
             self.limits = np.broadcast_to(own, shape)
-        if not (np.isfinite(self.limits).all() and (self.limits[0] <= self.limits[1]).all()):
-            raise InputError(source, "limits", "expected finite numbers, the least actions first")
+        if (self.limits[0] > self.limits[1]).any():
+            raise InputError(source, "limits", "expected the least actions first")
 
         times, grid = step * np.arange(self._steps), np.linspace(0.0, horizon, knots)
         self._between, self._shift = _shares(times, grid), _shares(grid + pause, grid)
@@ -209,10 +212,8 @@ class Planner:
         `readings` are of one robot, without an axis of robots. A time before the latest one
         begins anew; see reset().
         """
-        check_type("Planner", "now", now, numbers.Real)
+        now = float(checked_numbers(now, (), source="Planner", key="now", finite=True))
         check_type("Planner", "readings", readings, Readings)
-        if not math.isfinite(now):
-            raise InputError("Planner", "now", f"found {now}, expected a time in s")
         if now < self._latest:
             self.reset()
         self._latest = now

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.errors import InputError, check_type, checked_numbers
+from tetra_drake.errors import InputError, check_positive, check_type, checked_numbers
 from tetra_drake.laws.cable import CableLaw, Curve
 from tetra_drake.robot.gait import Gait, SteeringSignal, check_parameters
 from tetra_drake.robot.parameter_space import with_body
@@ -47,9 +47,7 @@ class Command:
         """Raises InputError if the command does not fit the driven cables of a robot, its period is
         not positive, or its samples are not finite numbers."""
         source, driven = f"command {self.name}", robot.driven
-        check_type(source, "period", self.period, numbers.Real)
-        if not 0.0 < self.period < math.inf:
-            raise InputError(source, "period", f"found {self.period}, expected a number above 0")
+        check_positive(source, "period", self.period)
         check_type(source, "samples", self.samples, np.ndarray)
         shape = max(1, len(self.samples)), driven.size
         checked_numbers(self.samples, shape, source=source, key="samples", finite=True)

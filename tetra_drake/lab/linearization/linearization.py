@@ -154,7 +154,7 @@ class Linearization:
                 states, which are not among the readings.
         """
         shape = len(self.inputs), len(self.states)
-        K = _checked(gain, shape, source="controller", key="gain")
+        K = checked_numbers(gain, shape, source="controller", key="gain", finite=True)
         self._check_readable()
         return lambda time, readings: self.signals - K @ self.deviation(readings)
 
@@ -210,13 +210,15 @@ def linearize(
     """
     robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
     size = 13 * len(robot.structure.bodies)
-    at = _checked(robot.equilibrium.state if state is None else state, (size,), key="state")
+    start = robot.equilibrium.state if state is None else state
+    at = checked_numbers(start, (size,), source="linearize", key="state", finite=True)
     poses = at[: size // 13 * 7].reshape(-1, 7)
     structure = dataclasses.replace(robot.structure, q_WB=poses[:, :4], p_WB=poses[:, 4:])
     robot = dataclasses.replace(robot, structure=structure)
     robot = robot if isinstance(given, Robot) else robot.controlled
     own_modes = robot.starting_modes if modes is None else modes
-    fixed = _checked(own_modes, (len(structure.contacts), MODE_COLUMNS), key="modes")
+    rows = len(structure.contacts), MODE_COLUMNS
+    fixed = checked_numbers(own_modes, rows, source="linearize", key="modes", finite=True)
     names = _reading_names(structure)
     check_type("linearize", "outputs", outputs, list, tuple)
     for output in outputs:
@@ -245,17 +247,10 @@ def linearize(
     )
 
 
-def _checked(
-    given: npt.ArrayLike, shape: tuple[int, ...], *, source: str = "linearize", key: str
-) -> np.ndarray:
-    """An argument as finite numbers of a shape. Raises InputError for anything else."""
-    return checked_numbers(given, shape, source=source, key=key, finite=True)
-
-
 def _checked_cost(given: npt.ArrayLike, size: int, key: str) -> np.ndarray:
     """A cost matrix (size, size) of lqr(). Raises InputError unless it is symmetric without
     negative eigenvalues, which Drake does not check."""
-    cost = _checked(given, (size, size), source="lqr", key=key)
+    cost = checked_numbers(given, (size, size), source="lqr", key=key, finite=True)
     least = np.linalg.eigvalsh(cost).min(initial=0.0)
     if not np.allclose(cost, cost.T, 1e-12, 0.0) or least < -1e-12 * np.abs(cost).max(initial=0.0):
         raise InputError("lqr", key, "expected a symmetric matrix without negative eigenvalues")
