@@ -52,7 +52,7 @@ def test_a_read_only_installation_caches_for_the_user_if_it_can(package, tmp_pat
 
 STAMPS = """
 import sys
-import tetra_drake.engines.lanes.places, tetra_drake.engines.observer
+import tetra_drake.engines.lanes.places, tetra_drake.engines.observer, tetra_drake.robot.equilibrium
 import tetra_drake.systems.ground_contact, tetra_drake.systems.cable_network
 from tetra_drake.kernels.stamp import stamp
 for module in [module for name, module in sys.modules.items() if "tetra_drake" in name]:

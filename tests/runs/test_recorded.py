@@ -163,7 +163,8 @@ def test_numbers_in_the_text_are_those_of_the_records(runs):
     assert round(float(times["1"][-1].replace(",", ".")), 0) == 2.0  # thousands
     assert "two thousand times faster than real time" in front
     _, _, relative = times["speed of `thesis` beside it"]
-    assert 2.0 <= float(times[DRAKE][1]) * float(relative) <= 3.0
+    assert round(float(times[DRAKE][1]) * float(relative)) == 6
+    assert "in place of six times" in front
     assert "in place of two or three times" in front
 
 
