@@ -165,7 +165,6 @@ def test_numbers_in_the_text_are_those_of_the_records(runs):
     _, _, relative = times["speed of `thesis` beside it"]
     assert round(float(times[DRAKE][1]) * float(relative)) == 6
     assert "in place of six times" in front
-    assert "in place of two or three times" in front
 
 
 def test_the_gallery_opens_every_replay_in_its_folder(runs, tmp_path, monkeypatch):
