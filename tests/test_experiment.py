@@ -84,12 +84,6 @@ def test_a_run_is_evolved_and_checked(make, tiny, tmp_path, reports, monkeypatch
     assert again.evaluations.equals(run.evaluations)
 
 
-def test_a_run_may_replace_another(tiny, tmp_path):
-    for seed in (1, 2):
-        run = tetra_drake.evolve(tiny, tmp_path, seed=seed, overwrite=True, **QUICK)
-        assert (run.manifest.seed, len(run.evaluations)) == (seed, 8)
-
-
 def scaled(factor):
     """Objectives of the same name."""
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from record import EXPERIMENTS
-from tables import aspect
 
 import tetra_drake as td
 from tetra_drake.cli import main, make_parser
@@ -248,16 +247,3 @@ def test_links_lead_somewhere(page: str) -> None:
         target = file.parent / path if path else file
         assert target.exists(), link
         assert not anchor or anchor in anchors(target), link
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_pictures_beside_each_other_have_one_height_and_all_have_a_text(page: str) -> None:
-    file = CHECKOUT / page
-    text = file.read_text(encoding="utf-8")
-    assert "![](" not in text
-    for line in text.splitlines():
-        shown = r'<img src="([^"]+)" width="([\d.]+)%?" alt="[^"]+"(?: align="right")?>'
-        pictures = re.findall(shown, line)
-        assert len(pictures) == line.count("<img")
-        heights = [float(width) / aspect(file.parent / source) for source, width in pictures]
-        assert not heights or max(heights) < 1.03 * min(heights), line

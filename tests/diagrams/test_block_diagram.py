@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from block_diagram import graphviz_source, save_block_diagram
+from block_diagram import graphviz_source
 
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -31,9 +31,3 @@ def test_blocks_ports_in_use_and_their_connections_are_shown(robot):
     edges = [line for line in source.splitlines() if "->" in line]
     assert len(edges) == len(robot.connection_map()) + robot.num_output_ports()
     assert '"cables":y0:e -> "forces":u0:w' in edges
-
-
-def test_a_missing_graphviz_is_named(robot, tmp_path, refused, monkeypatch):
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with refused(tmp_path / "robot.svg", "", "Graphviz"):
-        save_block_diagram(robot, tmp_path / "robot.svg")

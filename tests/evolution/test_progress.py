@@ -54,13 +54,3 @@ def test_the_time_left_counts_no_compilation_and_waits_until_it_is_known(monkeyp
     left = [line.partition("of 100")[2] for line in stream.getvalue().splitlines()]
     # After the first 8 gaits: 12 in 13 s, then 42 in 42 s.
     assert left == ["", "", ", 0:01:27 left", ", 0:00:50 left"]
-
-
-def test_a_terminal_shows_one_bar_for_the_run_and_one_per_stage(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "160")
-    stream = io.StringIO()
-    stream.isatty = lambda: True
-    with Progress(stream) as progress:
-        progress.show([STATUS, ENDED, FRESH])
-        progress.stage("best gaits", 2, 5)
-    assert all(text in stream.getvalue() for text in ("140/380", "best gaits", "2/5"))

@@ -31,15 +31,6 @@ def test_equal_data_give_equal_bytes_whatever_the_users_style(tmp_path):
     assert {name: files[name][: len(start)] for name, start in starts.items()} == starts
 
 
-def test_ticks_have_the_common_look_whoever_draws_them():
-    with matplotlib.rc_context({"xtick.labelsize": 20.0, "grid.color": "red"}):
-        figure = draw(1.0)
-        figure.draw_without_rendering()
-    ticks = figure.axes[0].xaxis.get_major_ticks()
-    looks = {(tick.label1.get_fontsize(), tick.gridline.get_color()) for tick in ticks}
-    assert looks == {(8.5, "0.86")}
-
-
 def test_a_name_is_no_formula_but_a_text_in_the_common_style_may_be():
     named = figure_function(lambda: page_of(height_in=1.0).suptitle("$x^2$").figure)()
     assert not named.texts[0].get_parse_math()

@@ -1,34 +1,24 @@
 """The pages in a real browser, headless and without network."""
 
-import base64
 import contextlib
-import io
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import quick_figures
-from helpers.synthetic_run import write_run
-from matplotlib.colors import hex2color, rgb_to_hsv
-from matplotlib.image import imread
 
 from tests.visualization.conftest import WINDOW, opened
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.films.browser import do, wait_until_loaded
 from tetra_drake.lab.films.video import make_video
-from tetra_drake.report.run_page import write_report
 from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
 from tetra_drake.visualization.replay import save_replay
-from tetra_drake.visualization.scene import COLOURS
 
 pytestmark = pytest.mark.slow
 
 ROBOT = Robot.of(load_scenario("thesis"))
-RUNS = Path(__file__).parents[2] / "runs"
 
 
 @pytest.fixture(scope="module")
@@ -69,18 +59,6 @@ def extent(page, trajectory, time):
     """Share of the picture's half width or height that the robot reaches."""
     points = trajectory["p_WN"].sel(time=time).values
     return np.abs(np.array(page.evaluate(PROJECT, points.tolist()))[:, :2]).max()
-
-
-def test_cables_and_feet_on_the_ground_are_seen(page):
-    do(page, "show", 2.0)
-    url = page.evaluate("viewer.capture_image(600, 400)")  # without the texts over it
-    png = base64.b64decode(url.removeprefix("data:image/png;base64,"))
-    image = imread(io.BytesIO(png), format="png")[..., :3]
-    hue, saturation, _ = np.moveaxis(rgb_to_hsv(image), -1, 0)
-    for name in ("actuated", "passive", "stance"):
-        wanted, wanted_saturation, _ = rgb_to_hsv(hex2color(COLOURS[name]))
-        apart = np.abs((hue - wanted + 0.5) % 1.0 - 0.5)
-        assert ((apart < 0.02) & (saturation > 0.7 * wanted_saturation)).sum() > 20
 
 
 def test_the_camera_follows_and_keeps_the_robot_large(page, trajectory):
@@ -154,19 +132,3 @@ def test_a_page_without_its_viewer_says_how_to_get_it(browser, trajectory, tmp_p
         page.goto(path.as_uri())
         page.wait_for_function("document.body.innerText.includes('tetra-drake replay')")
         assert "meshcat.js" in page.locator("body").inner_text()
-
-
-def test_a_report_shows_its_figures_and_leads_to_the_replay(browser, tmp_path, monkeypatch):
-    monkeypatch.setattr("tetra_drake.report.run_page.save_figure", quick_figures.save_figure)
-    run = write_run(tmp_path / "run", [[[(1.0, 0), (2.0, 1)]]])
-    _, replay, report = write_report(run)
-    with opened(browser, report.as_uri()) as page:
-        page.wait_for_load_state("networkidle")
-        assert page.evaluate("[...document.images].every(image => image.naturalWidth > 100)")
-        page.evaluate("document.querySelector('iframe').remove()")  # it draws at every width
-        for width in (400, 1280):
-            page.set_viewport_size({"width": width, "height": 800})
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
-        page.locator(f"a[href='{replay.name}']").first.click()
-        wait_until_loaded(page)
-        assert page.evaluate("film.duration") == pytest.approx(0.3)

@@ -2,29 +2,21 @@
 
 import importlib
 import os
-import re
 import signal
 import socket
-import subprocess
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from importlib import metadata
-from pathlib import Path
 from unittest.mock import Mock
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 from helpers import analytic
-from helpers.converged import shortly
 
 from tetra_drake import cli
-from tetra_drake.evolution import evaluators
 from tetra_drake.evolution.evaluators import evaluate_all, on_executor
-from tetra_drake.evolution.run import load_run
 from tetra_drake.lab.cluster import dask_cluster, local_cluster
-from tetra_drake.scenario.load import dump_scenario
 
 dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
 
@@ -109,33 +101,6 @@ def test_workers_with_other_versions_are_refused(cluster, refused):
         client.run(importlib.reload, metadata)
     with dask_cluster(cluster) as executor:
         assert executor.workers == 2
-
-
-@pytest.mark.slow
-def test_the_batch_script_of_the_page_runs_and_goes_on(tmp_path):
-    """With a stand-in for SLURM's srun. Submitted once more, the script resumes the run."""
-    page = Path(evaluators.__file__).with_name("machines.md").read_text(encoding="utf-8")
-    (script,) = re.findall(r"^```bash\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    with socket.socket() as free:
-        free.bind(("", 0))
-        script = script.replace("8786", str(free.getsockname()[1]))
-    (tmp_path / "job").write_text(script.replace("--scenario thesis", "--scenario short.yaml"))
-    scenario = analytic.small_scenario(population=4, iterations=1, trials=1)
-    (tmp_path / "short.yaml").write_text(dump_scenario(shortly(scenario, 0.3)))
-    main = "from tetra_drake.cli import main; raise SystemExit(main())"
-    for name, program in (("srun", ""), ("tetra-drake", f'{sys.executable} -c "{main}" ')):
-        (tmp_path / name).write_text(f'#!/bin/sh\nexec {program}"$@"\n')
-        (tmp_path / name).chmod(0o755)
-    path = os.pathsep.join([str(tmp_path), str(Path(sys.executable).parent), os.environ["PATH"]])
-    for _ in range(2):
-        job = subprocess.Popen(
-            ["bash", "job"], cwd=tmp_path, env=os.environ | {"PATH": path}, start_new_session=True
-        )
-        try:
-            assert job.wait(240) == 0
-        finally:
-            os.killpg(job.pid, signal.SIGKILL)  # SLURM ends what a job has left running
-    assert load_run(tmp_path / "runs" / "cluster").statuses[0].stop
 
 
 def cluster_of_a_thread(workers):

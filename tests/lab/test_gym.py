@@ -10,17 +10,14 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
 from helpers.actuations import FORCE, MOTOR, WINCH
 from helpers.converged import shortly
 
 from tetra_drake.engines.lanes.batch import processor_lanes
 from tetra_drake.gym import ROLL, WALK, TensegrityEnv, TensegrityVectorEnv
 from tetra_drake.lab.stepping.simulation import Simulation
-from tetra_drake.robot.readings import pitch_rates
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.experiment_sections import Disturbances
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.sensing import Sensing
 from tetra_drake.visualization.scene import COLOURS
@@ -100,19 +97,6 @@ def test_the_rewards_of_an_episode_are_the_fitness(short, objective):
     assert (dense.size > 5) == (objective != "cost_of_transport")
 
 
-def test_each_reward_for_rolling_is_the_angle_rolled_since_the_last(short):
-    env, rolled, rewards = TensegrityEnv(short.with_sections(objective={"rolled": 2.0})), [0.0], []
-    env.reset(seed=3)
-    simulation, before = env._episodes.simulation, 0.0
-    for action in np.random.default_rng(0).uniform(-1, 1, (8, *env.action_space.shape)):
-        rewards.append(env.step(action)[1])
-        rate = pitch_rates(simulation.state, simulation.robot.structure)[0]
-        rolled.append(rolled[-1] + 0.02 * (before + rate) / 2.0)
-        before = rate
-    assert rewards == pytest.approx(2.0 * np.diff(rolled), rel=1e-9)
-    assert np.abs(rewards).min() > 0.0
-
-
 def test_a_robot_that_fails_ends_its_episode_with_nothing(short):
     env = TensegrityEnv(short.with_changes({"cpg.gain": "4e9 N"}))
     _, rewards, terminated, truncated = episode(env, seed=0)
@@ -146,14 +130,6 @@ def test_robots_side_by_side_do_what_environments_of_one_robot_do(short, mode):
         assert ours[4].keys() == theirs[4].keys()
 
 
-def test_wrappers_of_gymnasium_take_robots_side_by_side(short):
-    options = {"num_envs": 2, "scenario": short, "max_episode_steps": 3}
-    many = NormalizeObservation(RecordEpisodeStatistics(gymnasium.make_vec(WALK, **options)))
-    many.reset(seed=0)
-    steps = [many.step(many.action_space.sample()) for _ in range(3)]
-    assert [step[3].tolist() for step in steps] == [[False] * 2, [False] * 2, [True] * 2]
-
-
 def test_a_picture_shows_the_robot_on_its_floor(short):
     env = gymnasium.make(WALK, scenario=short, render_mode="rgb_array")
     env.reset(seed=0)
@@ -177,12 +153,6 @@ def test_a_copy_begins_anew(short, refused):
             with refused("tetra_drake.gym", "step", "reset()"):
                 copied.step(np.zeros(copied.action_space.shape))
             assert np.array_equal(copied.reset(seed=3)[0], each.reset(seed=3)[0])
-
-
-def test_a_robot_that_stands_still_scores_nothing():
-    env = TensegrityEnv(load_scenario("walk"), grouped=True)
-    env.reset(seed=0)
-    assert sum(env.step(np.zeros(4))[1] for _ in range(300)) == pytest.approx(0.0, abs=0.01)
 
 
 def test_without_gymnasium_the_import_tells_what_to_install(monkeypatch, refused):

@@ -2,7 +2,6 @@
 
 import json
 import math
-from dataclasses import replace
 
 import numpy as np
 import pandas
@@ -11,7 +10,7 @@ from helpers.anchored import HUNG, SWINGING, scenario_of
 
 import tetra_drake as td
 from tetra_drake.cli import main
-from tetra_drake.lab.predict.predict import drawn_scenarios, predict, predictions_figure
+from tetra_drake.lab.predict.predict import drawn_scenarios, predict
 from tetra_drake.lab.predict.variates import variates_of
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -152,18 +151,3 @@ def test_draws_are_simulated_with_a_gait():
     assert both["distance"].equals(draws["way"].rename("distance"))
     alone = predict(scenario, at_rest, draws=4).draws
     np.testing.assert_allclose(both[at_rest], alone[at_rest], rtol=1e-6)
-
-
-def test_the_figure_shows_percent_of_the_nominal_value_or_nothing():
-    made = predict(hung(**{"masses": "2 % each"}), ["frequency 1", "tension line"], draws=8)
-    names = ["wide", "narrow", "zero"]
-    numbers = {"nominal": [0.57, -2.0, 0.0], "median": [0.9, -2.0, 0.0], "low": [0.5, -2.1, -1.0]}
-    numbers |= {"high": [1.9, -1.9, 1.0], "unit": "m", "draws": 8}
-    shares = made.shares.reindex(names)
-    made = replace(made, quantities=pandas.DataFrame(numbers, index=names), shares=shares)
-    panel = predictions_figure(made).axes[0]
-    zero, narrow, wide = panel.collections[0].get_segments()
-    assert wide[:, 0] == pytest.approx([100 * (0.5 / 0.57 - 1), 100 * (1.9 / 0.57 - 1)])
-    assert narrow[:, 0] == pytest.approx([-5.0, 5.0])
-    assert np.isnan(zero).any() or not len(zero), "an interval of 2 m about 0 is no share of it"
-    assert [text.get_position()[1] for text in panel.texts] == [0]

@@ -1,6 +1,5 @@
 """Replay pages of result folders, gait files and runs; result folders are read as written."""
 
-import dataclasses
 import json
 from pathlib import Path
 from unittest.mock import Mock
@@ -15,14 +14,12 @@ from tetra_drake.report.result_folder import (
     check_result_folder,
     load_or_simulate,
     load_result,
-    save_result,
     save_result_folder,
     write_replay,
 )
 from tetra_drake.results.result import headline
 from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.settings.units import INCH
 
 
 def test_of_a_run_the_fittest_gait_is_simulated(run, tiny):
@@ -117,13 +114,3 @@ def test_a_folder_gives_the_result_back(folder, result):
     assert load_scenario(folder / "scenario.yaml") == result.scenario
     assert load_gait(folder / "gait.json", result.scenario) == result.gait
     assert texts["title"] == f"{result.name}: {headline(result.scenario, vars(result.metrics))}"
-
-
-def test_lengths_are_written_in_inches_too(tmp_path, result):
-    metrics = dataclasses.replace(result.metrics, path_curvature=0.0)
-    save_result(tmp_path / "result.json", dataclasses.replace(result, metrics=metrics))
-    content = json.loads((tmp_path / "result.json").read_text())
-    lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift", "clearance"}
-    expected = {f"{name}_in": getattr(metrics, name) / INCH for name in lengths}
-    shown = {key: content[key] for key in content if key.endswith("_in")}
-    assert shown == expected | {"path_radius_in": None}

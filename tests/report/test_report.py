@@ -14,7 +14,6 @@ from helpers.synthetic_run import tiny_scenario, write_run
 from tetra_drake.cli import make_parser
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.run import load_run
-from tetra_drake.formatting import rounded
 from tetra_drake.report.run_page import (
     BLOCK_DIAGRAM,
     RECORDED_GAIT,
@@ -22,8 +21,6 @@ from tetra_drake.report.run_page import (
     simulate_shown_gaits,
     write_report,
 )
-from tetra_drake.report.summary import run_text
-from tetra_drake.results.result import headline
 from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
@@ -143,40 +140,10 @@ def test_each_trial_and_each_setting_that_differs_from_the_thesis_has_a_row(page
     assert page.row("required") == ["lead: 0.5 in"]
 
 
-def test_the_best_gait_is_shown_with_its_weights_and_as_recorded(study, source, page):
-    gait = study.best.result.gait
-    weights = [pair for pair in gait.parameters.items() if pair[0].startswith("weight ")]
-    assert len(weights) == 4
-    for name, weight in weights:
-        title = "oscillator {} inhibits {}: ".format(*re.findall(r"\d", name)) + rounded(weight)
-        assert re.search(rf'title="{title}"[^>]*>\s*{weight:.2f}\s*<', source), title
-    # As recorded; simulated again, this gait moves elsewhere, which a note says.
-    assert "walks 2.0 in" in page.texts["h1"][0]
-    assert any("2 in (trial 1, evaluation 4)" in text for text in page.texts["p"])
-
-
 def test_metrics_of_the_best_gait_stand_beside_the_initial_ones(page):
     assert page.row("distance (in)")[:2] == ["0.750", "2.00"]
     assert page.row("cost of transport")[:2] == ["0.100", "0.900"]
     assert page.row("heading change (deg)") is None  # which no gait has
-
-
-def test_gaits_of_a_run_with_disturbances_are_shown_undisturbed(tmp_path, study):
-    disturbed = {"disturbances": {"draws": 3, "start": 0.1}}
-    scenario = tiny_scenario().with_changes(disturbed)
-    shown = simulate_shown_gaits(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
-    assert shown.best.result.metrics == study.best.result.metrics
-    page = render(shown)
-    # The title tells the robot of the replay first, then the mean of the draws.
-    first, second = page.texts["h1"][0].split("; ")
-    assert first.endswith(headline(scenario, vars(shown.best.result.metrics)))
-    assert "3 draws" in second and second.endswith(headline(scenario, shown.best.recorded))
-    assert page.row("distance")[0].startswith(rounded(shown.best.result.metrics.distance_in))
-    assert page.row("mean of 3 draws")[0].startswith("2.00 in")
-    assert any("3 draws" in text for text in page.texts["p"])
-    assert headline(scenario, shown.best.recorded) in str(shown.run)
-    text = run_text(shown.run)
-    assert f"{rounded(shown.best.result.metrics.distance_in)} in, undisturbed" in text
 
 
 def test_the_commands_to_reproduce_it_are_commands(page):
@@ -205,20 +172,6 @@ def test_an_unfinished_run_and_what_the_diagram_made_of_its_best(tmp_path):
     (place,) = (row.index("in Drake") for row in page.table if "in Drake" in row)
     trials = [row for row in page.table if "not finished" in row or row[0] == "1"]
     assert [row[place] for row in trials if len(row) > place] == ["1.23", "1.23"]
-
-
-def test_a_run_of_the_thesis_s_robot_shows_its_diagram_and_the_best_recorded_gait(tmp_path, run):
-    brief = {"simulation.duration": "0.1 s", "simulation.steady_from": "0 s"}
-    scenario = load_scenario("quick").with_changes(brief)
-    folder = write_run(tmp_path / "run", TRIALS, scenario=scenario)
-    write_report(folder)
-    page = Page((folder / "report.html").read_text(encoding="utf-8"))
-    frames = [values["src"] for tag, values in page.tags if tag == "iframe"]
-    assert frames == ["replay.html", "recorded.html"]
-    assert all((folder / frame).is_file() for frame in frames)
-    images = [values["src"].split(",", 1)[1] for tag, values in page.tags if tag == "img"]
-    assert BLOCK_DIAGRAM.read_bytes() in map(base64.b64decode, images)
-    assert not (run / "recorded.html").exists()  # of another robot
 
 
 def test_the_block_diagram_and_the_recorded_gait_are_up_to_date():

@@ -1,7 +1,6 @@
 """What `structure` says of heavy robots and of turned ones."""
 
 import numpy as np
-import pytest
 from helpers.converged import shortly
 
 from tetra_drake.engines.simulate import simulate
@@ -11,22 +10,6 @@ from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.remarks import sinking_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-
-BEAM = """
-unit: m
-nodes: {a: [0, 0, 0], b: [1, 0, 0]}
-struts:
-  beam: {pairs: [[a, b]], diameter: 2 cm, density: 1 g/cm^3, node_diameter: 0 m}
-masses: {a: 150 kg, b: 150 kg}
-"""
-
-
-def test_a_heavy_structure_stands_on_a_ground_that_bears_it(tmp_path):
-    (tmp_path / "beam.yaml").write_text(BEAM)
-    robot = robot_of_file(str(tmp_path / "beam.yaml"))
-    assert robot.scenario.ground.stiffness == pytest.approx(robot.weight / 0.01, rel=0.02)
-    depths = robot.structure.contact_radius - study_equilibrium(robot).nodes["z"]
-    assert 0.0 < depths.max() < 0.01
 
 
 def test_a_robot_that_sinks_into_its_ground_is_told_a_stiffness(tmp_path, result):

@@ -7,9 +7,7 @@ import re
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.evolution.run import load_run
-from tetra_drake.laws.friction import Coulomb
-from tetra_drake.report.summary import ground_text, result_text, results, run_text
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.report.summary import result_text, results
 from tetra_drake.settings.units import INCH
 
 
@@ -40,12 +38,6 @@ def test_metrics_have_rows_in_the_units_of_people_and_unmet_requirements_lines(t
     assert next(iter(shown)) == "heading change (deg)"
 
 
-def test_the_ground_is_named_with_its_terrain_and_friction():
-    text = ground_text(load_scenario("steps").with_changes({"friction": Coulomb(lateral=2.0)}))
-    assert all(word in text for word in ("height 0.25 in", "count 4", "lateral 2"))
-    assert "MuJoCo" in ground_text(load_scenario("thesis").with_changes({"engine": "!Mujoco"}))
-
-
 def test_a_run_is_summed_up_by_the_metric_of_its_objective(tmp_path):
     # By trials, in inches: from 2 to 3, from 5 to 6, from 5.5 to 4; the fittest walks 6 in.
     trials = [[[(a, 0)], [(b, 0)]] for a, b in ((4.0, 6.0), (10.0, 12.0), (11.0, 8.0))]
@@ -63,11 +55,3 @@ def test_a_run_is_summed_up_by_the_metric_of_its_objective(tmp_path):
     turned = dict(results(load_run(run)))
     assert turned["heading change"].startswith("6.00 deg")
     assert "distance" not in turned and "best of each trial" not in turned
-
-
-def test_a_run_without_a_fitness_is_summed_up_by_its_effort_and_its_last_failure(tmp_path):
-    run = load_run(write_run(tmp_path / "run", [[[(None, 0)]]] * 2))
-    summary = dict(results(run))
-    assert [*summary] == ["evaluations", "time per evaluation", "last failure"]
-    assert summary["last failure"] == run.evaluations["failure"].iloc[-1]
-    assert summary["last failure"] in run_text(run)

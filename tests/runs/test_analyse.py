@@ -1,7 +1,6 @@
 """What analyse.py simulates of a run's best gaits."""
 
 import functools
-import json
 from concurrent.futures import ThreadPoolExecutor
 
 import analyse
@@ -83,13 +82,3 @@ def test_gaits_walk_on_unseen_ground_and_may_miss_requirements_there(folder, mon
         assert row["distance_in"] == walked.metrics.distance_in and row["met"]
     apart = rough.with_changes({"require": {"clearance": "6 in"}})
     assert not any(row["met"] for row in analyse.on_unseen_ground(apart, gaits, workers=1))
-
-
-def test_a_missing_or_damaged_analysis_is_refused(folder, tmp_path, refused):
-    path = tmp_path / analyse.ANALYSIS
-    with refused(path, "", "analyse.py"):
-        analyse.load_analysis(tmp_path)
-    content = json.loads((folder / analyse.ANALYSIS).read_text())
-    path.write_text(json.dumps(content | {"resimulations": [{"trial": 0}]}))
-    with refused(path, "", "analyse.py"):
-        analyse.load_analysis(tmp_path)

@@ -53,17 +53,3 @@ def test_a_strong_trial_pulls_harder_in_the_same_rhythm_without_the_cable():
 def test_the_page_is_made_from_the_records():
     records = map(damage.read, (damage.WALKS, damage.PLANS, damage.CANDIDATES))
     assert damage.page(*records) == (damage.HERE / "README.md").read_text("utf-8")
-
-
-def test_points_of_the_figure_have_the_colours_of_its_legend():
-    shares = damage.outcomes(damage.read(damage.WALKS))
-    figure = damage.speed_figure(shares, damage.planned(damage.read(damage.PLANS)))
-    panel = figure.axes[0]
-    lines = panel.get_legend().get_lines()
-    texts = [text.get_text() for text in panel.get_legend().get_texts()]
-    colours = {text: line.get_color() for text, line in zip(texts, lines, strict=True)}
-    last = shares[shares["group"] == shares["group"].iloc[-1]]
-    for label, column in {"old gait": "lost", "after trials": "found"}.items():
-        middle = last[column].median()
-        drawn = [line for line in panel.lines if [*line.get_xdata()] == [middle]]
-        assert [line.get_color() for line in drawn] == [colours[label]]

@@ -109,28 +109,6 @@ def test_blind_forces_hold_and_blind_heights_do_not_until_the_supports_stay_in_p
     assert "12 of 15 hold" in PAGE
 
 
-def test_a_peak_of_the_prism_is_at_one_mode_and_every_foot_of_laika_has_a_lift():
-    peaks = measured_intervals.measured_peaks()
-    assert sorted(peaks.values()) == [5.45, 7.27, 9.7, 10.44, 11.39, 13.3]
-    by_mode = [peaks[name] for name in sorted(peaks)]
-    assert by_mode == sorted(by_mode)
-    assert sorted(measured_intervals.measured_lifts().values()) == [23.6, 25.6, 29.6, 32.8]
-
-
-def test_measured_heights_of_the_simplex_repeat_to_3_mm_only():
-    table = pandas.read_csv(measured.HERE / "simplex_tightening.csv")
-    ends = (
-        table[table["element"].isin(["S1", "H3", "H4", "H5"])].groupby(["figure", "element"]).last()
-    )
-    forces, heights = (
-        ends.loc[[("5f", "S1"), ("5g", "S1")], "value"],
-        ends.drop("S1", level=1)["value"],
-    )
-    assert np.ptp(forces) < 0.1  # kN
-    apart = heights["5f"] - heights["5g"]
-    assert apart.min() > 1.5 and 2.9 < apart.max() < 3.6
-
-
 def truss_heights(scenario, lengthening: float) -> np.ndarray:
     """Heights (mm) of the upper nodes of a simplex as a truss whose supports do not give way."""
     robot = scenario.robot
@@ -206,15 +184,3 @@ def test_a_longer_tube_stresses_all_members_of_the_simplex_by_the_published_mode
     added = {member: force[f"{member} at +8 mm"] - force[f"{member} at +2 mm"] for member in MODE}
     for member, share in MODE.items():
         assert added[member] / added["S1"] == pytest.approx(share, rel=0.02)
-
-
-def test_totals_count_the_intervals_that_hold_the_measured_value():
-    rows = pandas.DataFrame({"kind": ["shape", "shape"], "median": [1.0, 2.2], "low": [0.9, 2.1]})
-    rows = rows.assign(high=[1.1, 2.3], measured=[1.0, 2.0])
-    found = measured.totals(rows, "kind")
-    assert [*found] == ["shape", "all"] and found["shape"] == found["all"]
-    assert found["shape"] == (2, 1, "0.1 mm", pytest.approx(2.0**0.5))
-    of_forces = measured.totals(rows.assign(kind="force"), "kind")["force"]
-    assert of_forces == (2, 1, "5.0 %", pytest.approx(2.0**0.5))
-    twice = measured.totals(pandas.concat([rows, rows]), "kind")
-    assert (twice["all"].total, twice["all, repeated tests once"].total) == (4, 2)

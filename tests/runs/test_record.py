@@ -1,9 +1,5 @@
 """Making recorded runs: what is done is kept, and what is written can be read."""
 
-import filecmp
-import shutil
-
-import pandas
 import pytest
 import record
 from analyse import ANALYSIS
@@ -15,7 +11,6 @@ from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
 MAP = QualityDiversity(cells=[2, 2], draws=1)
 FEW = {"robot.tetrahedra": 2, "optimizer": MAP, "evolution.trials": 2, "evolution.evaluations": 8}
-GENERATIONS = {"optimizer": {"population": 4, "tournament": 2}}
 TINY = record.Experiment("two tetrahedra", "thesis", BRIEF | FEW, film=True)
 
 
@@ -57,25 +52,3 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     record.record("tiny", TINY, scratch=scratch, out=out)
     assert load_run(out / "tiny").evaluations.equals(run.evaluations)
     assert analysed == [scratch / "tiny"]
-
-
-@pytest.mark.slow
-def test_an_experiment_goes_on_from_what_was_shown_of_it_so_far(tmp_path, analysed):
-    experiment = record.Experiment("two tetrahedra", "thesis", BRIEF | FEW | GENERATIONS)
-    folders = [tmp_path / name for name in ("whole", "cut", "again")]
-    whole, cut, again = folders
-    record.record("tiny", experiment, scratch=whole, out=tmp_path / "finished")
-    shutil.copytree(whole / "tiny", cut / "tiny")
-    for name, lines in (("evaluations", 6), ("iterations", 2)):  # the first of two generations
-        file = cut / f"tiny/trial_00/{name}.jsonl"
-        file.write_text("".join(file.read_text().splitlines(keepends=True)[:lines]))
-    record.record_so_far("tiny", experiment, scratch=cut, out=tmp_path / "shown")
-    shown = load_run(tmp_path / "shown/tiny")
-    assert shown.evaluations.groupby("trial").size().tolist() == [6, 8]
-    assert not shown.manifest.thinned and (tmp_path / "shown/tiny/replay.html").exists()
-    record.record("tiny", experiment, scratch=again, out=tmp_path / "shown")
-    runs = [load_run(folder / "tiny").evaluations for folder in (whole, again)]
-    first, second = (evaluations.drop(columns="wall_time_s") for evaluations in runs)
-    pandas.testing.assert_frame_equal(first, second, check_exact=True)
-    assert load_run(tmp_path / "shown/tiny").manifest.thinned
-    assert filecmp.cmp(again / "tiny" / ANALYSIS, tmp_path / "shown/tiny" / ANALYSIS)

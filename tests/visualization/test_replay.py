@@ -16,13 +16,10 @@ from helpers.meshcat_page import commands, read_page
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.films.browser import do, wait_until_loaded
 from tetra_drake.lab.films.video import encode, make_video
-from tetra_drake.lab.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.laws.terrain import Incline
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.settings.units import INCH, POUND_FORCE
 from tetra_drake.visualization.replay import (
     RESOLUTION,
@@ -110,22 +107,6 @@ def test_in_a_browser_bodies_are_where_they_were_and_cables_between_them(browser
             np.testing.assert_allclose(places, frames["p_WB"].values[frame], rtol=0, atol=1e-5)
             feet = frames["p_WN"].sel(node=["T1 bottom_left", "T2 bottom_left"]).values[frame]
             assert length == pytest.approx(np.linalg.norm(feet[1] - feet[0]), abs=1e-4)
-
-
-@pytest.mark.slow
-def test_bodies_with_slashes_in_their_names_are_where_they_rest(browser, tmp_path):
-    """Such as those of NTRT's substructures."""
-    tree = read_structure("prism").model_dump() | {"actuated": {}}
-    text = json.dumps(tree).replace('"n', '"leg/n').replace('"leg/nod', '"nod')
-    given = StructureFile.model_validate(json.loads(text))
-    robot = Robot.of(load_scenario("prism").with_sections(robot=given))
-    save_structure_page(study_equilibrium(robot), tmp_path / "prism.html")
-    with opened(browser, (tmp_path / "prism.html").as_uri()) as loaded:
-        wait_until_loaded(loaded)
-        loaded.evaluate("film.show(0)")  # later it swings
-        for name, place in zip(robot.structure.bodies, robot.structure.p_WB, strict=True):
-            found = loaded.evaluate(PLACE, ["robot", *name.split("/")])
-            assert found == pytest.approx(place.tolist(), abs=1e-4)
 
 
 @pytest.mark.parametrize("program", ["cat > /dev/null; exit 228", "exit 0"])
