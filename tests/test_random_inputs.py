@@ -12,6 +12,7 @@ import json
 import math
 import os
 import random
+import re
 import time
 import traceback
 from collections import Counter
@@ -20,18 +21,23 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import bench
+import mujoco
 import numpy as np
 import pytest
 import yaml
 from helpers.brief import BRIEF
 from helpers.files import DATA
 from pydrake.common import RandomGenerator
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
 
 import tetra_drake as td
 from tetra_drake.cli import main
 from tetra_drake.engines.drake import MakeDisturbedSimulator, MakeSimulator
+from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.lab.bridges.conversion import converted
+from tetra_drake.lab.bridges.sdf import make_sdf
 from tetra_drake.lab.gym.environments import TensegrityVectorEnv
 from tetra_drake.laws.terrain import Grid, Relief
 from tetra_drake.optimizers.base import Evaluation
@@ -69,31 +75,43 @@ def made():
     return simulation, readings, planner, diagram, td.linearize(PRISM), td.seeded_gait(PRISM, 1)
 
 
+def mild(rng, value):
+    """A value of the same kind: another digit, or up to half as much again."""
+    if isinstance(value, str):
+        return re.sub(r"[1-9]", lambda _: rng.choice("123456789"), value)
+    return value * rng.uniform(0.5, 1.5) if isinstance(value, (float, np.ndarray)) else value
+
+
 def odd(rng, **given):
-    """Arguments, one or two of which are something else."""
+    """Arguments, one or two of which are something else, in half of the cases mildly."""
+    near = rng.random() < 0.5
     for key in rng.sample([*given], min(len(given), rng.choice([1, 1, 2]))):
-        given[key] = rng.choice(ODD)
+        given[key] = mild(rng, given[key]) if near else rng.choice(ODD)
     return given
 
 
 def mutated(rng, tree):
-    place = tree = copy.deepcopy(tree)
+    place, near = (tree := copy.deepcopy(tree)), rng.random() < 0.5
     while isinstance(place, (dict, list)) and place:
         key = rng.choice([*(place if isinstance(place, dict) else range(len(place)))])
-        if rng.random() < 0.4 or not isinstance(place[key], (dict, list)):
-            place[key] = rng.choice(PLAIN)
+        if not isinstance(place[key], (dict, list)) or (not near and rng.random() < 0.4):
+            place[key] = mild(rng, place[key]) if near else rng.choice(PLAIN)
             break
         place = place[key]
     return tree
 
 
 def garbled(rng, folder, suffix, text):
-    for _ in range(rng.randint(1, 4)):
-        at, end = rng.randrange(len(text)), rng.randint(0, 12)
-        piece = rng.choice(
-            ["", "9" * 9, "-1", "nan", "<", "--", "\x1b", text[at : at + 30], "1e999"]
-        )
-        text = text[:at] + piece + text[at + end :]
+    if rng.random() < 0.4:
+        at = rng.randrange(len(text))
+        text = text[:at] + mild(rng, text[at : at + 9]) + text[at + 9 :]
+    else:
+        for _ in range(rng.randint(1, 4)):
+            at, end = rng.randrange(len(text)), rng.randint(0, 12)
+            piece = rng.choice(
+                ["", "9" * 9, "-1", "nan", "<", "--", "\x1b", text[at : at + 30], "1e999"]
+            )
+            text = text[:at] + piece + text[at + end :]
     (folder / f"a{suffix}").write_text(text, "utf-8")
     return folder / f"a{suffix}"
 
@@ -232,6 +250,56 @@ def played(rng, folder):
     env.step(rng.choice([env.action_space.sample(), *ODD]))
 
 
+NAMES = [
+    "<x/>",
+    "--",
+    "-->",
+    "]]>",
+    "&amp;",
+    '"',
+    "'",
+    "::",
+    "__x__",
+    "world",
+    " ",
+    "\n",
+    "\t",
+    "/",
+]
+NAMES += [
+    "\x1b[31m",
+    "\u202e",
+    "\x00",
+    "\ufffe",
+    "ä",
+    "𝔘",
+    "..",
+    "%s",
+    "{0}",
+    "null",
+    "x" * 300,
+    "7",
+]
+
+
+def named(rng, folder):
+    """Drake and MuJoCo read what is written of a robot whose parts have odd names."""
+    old, new = (
+        rng.choice(["n0", "n4", "bar", "side"]),
+        "".join(rng.choices(NAMES, k=rng.choice([1, 2]))),
+    )
+    text = re.sub(
+        rf"\b{old}\b", lambda _: json.dumps(new, ensure_ascii=False)[1:-1], json.dumps(TREE)
+    )
+    (folder / "a.yaml").write_text(text, "utf-8")
+    plain = PRISM.with_changes({"friction.stiffness": "0 N/m"}).on_engine("mujoco")
+    robot = Robot.of(plain.with_sections(robot=read_structure(folder / "a.yaml")))
+    mujoco.MjModel.from_xml_string(make_mjcf(robot))
+    sdf = make_sdf(robot.structure, robot.structure.initial_state, name=new)
+    Parser(plant := MultibodyPlant(0.0)).AddModelsFromString(sdf, "sdf")
+    assert all(plant.HasFrameNamed(f"node {node}") for node in robot.structure.node_names)
+
+
 SPRINGS = yaml.safe_load(
     """
 coil: {pairs: [[n0, n1]], stiffness: 60 N/m, damping: 1 N*s/m, free_length: 0.1 m,
@@ -314,6 +382,7 @@ SURFACES = {
     "bench": entered,
     "Simulation": stepped,
     "gym": played,
+    "names": named,
     "springs": sprung,
     "sensing": sensed,
 }

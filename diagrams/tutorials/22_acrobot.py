@@ -98,3 +98,4 @@ axes.plot(moved.sample_times(), np.degrees(moved.data()[:2].T), label=["shoulder
 axes.legend()
 figure.savefig(f"{Path(__file__).stem}.png", dpi=120)
 print(f"at the end {np.degrees(moved.data()[:2, -1]).round(2)} degrees")
+assert np.allclose(moved.data()[:, -1], upright, atol=0.05)  # whatever the solver has left
