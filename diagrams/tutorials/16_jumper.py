@@ -33,6 +33,7 @@ def flights(drawn: list[np.ndarray]) -> list[np.ndarray]:
         motion = result.trajectory.sel(time=slice(release, None))
         x, y, rise = (motion.p_WB.mean("body") - motion.p_WB.mean("body")[0]).values.T
         touches, top = motion.in_contact.any("contact").values, rise.argmax()
+        assert touches[top:].any(), "the robot is still in the air at the end"
         paths.append(np.array([np.hypot(x, y), rise])[:, : top + touches[top:].argmax() + 1])
     return paths
 
