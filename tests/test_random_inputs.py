@@ -90,6 +90,11 @@ def odd(rng, **given):
     return given
 
 
+def either(rng, value):
+    """The value itself, or something else."""
+    return rng.choice([value, rng.choice(ODD)])
+
+
 def mutated(rng, tree):
     place, near = (tree := copy.deepcopy(tree)), rng.random() < 0.5
     while isinstance(place, (dict, list)) and place:
@@ -127,7 +132,7 @@ def changed(rng, folder):
     context = made()[3].CreateDefaultContext()
     cables, ground = (made()[3].GetSubsystemByName(name) for name in ("cables", "ground"))
     law = cables.GetLaw(own := cables.GetMyMutableContextFromRoot(context))
-    cables.SetLaw(own, rng.choice([law._replace(**odd(rng, **law._asdict())), *ODD]))
+    cables.SetLaw(own, either(rng, law._replace(**odd(rng, **law._asdict()))))
     given = Robot.of(PRISM).ground._replace(**odd(rng, friction=0, normal=0))
     ground.SetGround(ground.GetMyMutableContextFromRoot(context), given)
 
@@ -236,10 +241,9 @@ def entered(rng, folder):
 
 def stepped(rng, folder):
     given = odd(rng, count=2, control_period=0.1, record=False, workers=1)
-    simulation = td.Simulation(rng.choice([PRISM, PRISM, *ODD]), **given)
-    actions = rng.choice([simulation.rest, simulation.rest, *ODD])
-    simulation.step(actions)
-    simulation.reset(**odd(rng, places=[0]))
+    simulation = td.Simulation(either(rng, PRISM), **given)
+    simulation.step(either(rng, simulation.rest))
+    simulation.reset(**odd(rng, seed=None, indices=[0]))
 
 
 def played(rng, folder):
@@ -247,7 +251,7 @@ def played(rng, folder):
     options |= {"workers": 1, "max_episode_steps": 3, "autoreset_mode": "SameStep"}
     env = TensegrityVectorEnv(**odd(rng, num_envs=2, scenario=PRISM, **options))
     env.reset(**odd(rng, seed=1, options=None))
-    env.step(rng.choice([env.action_space.sample(), *ODD]))
+    env.step(either(rng, env.action_space.sample()))
 
 
 NAMES = [
@@ -366,8 +370,10 @@ SURFACES = {
     "lqr": regulated,
     "form_find": lambda r, f: td.form_find(**odd(r, scenario="prism", prestress={"side": "9 N"})),
     "spread": lambda r, f: td.spread(*odd(r, a=PRISM, b=made()[5]).values()),
-    "vector": lambda r, f: td.ParameterSpace.of(PRISM).vector(**odd(r, gait=0)),
-    "gait": lambda r, f: td.ParameterSpace.of(PRISM).gait(**odd(r, vector=np.zeros(62), name="a")),
+    "vector": lambda r, f: td.ParameterSpace.of(PRISM).vector(**odd(r, gait=made()[5])),
+    "gait": lambda r, f: td.ParameterSpace.of(PRISM).gait(
+        **odd(r, vector=td.ParameterSpace.of(PRISM).vector(made()[5]), name="a")
+    ),
     "executors": evolved,
     "diagram": lambda r, f: MakeTensegrityDiagram(**odd(r, robot=Robot.of(PRISM), gait=made()[5])),
     "MakeSimulator": lambda r, f: MakeSimulator(
