@@ -395,7 +395,8 @@ SURFACES = {
 
 
 @pytest.mark.slow
-def test_random_inputs_are_used_or_refused_in_one_line(tmp_path):
+def test_random_inputs_are_used_or_refused_in_one_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     rng, count, faults = random.Random(SEED), Counter(), []
     made()
     for number in range(INPUTS):

@@ -11,6 +11,7 @@ import pandas
 import xarray
 from matplotlib import rcParams
 from matplotlib.axes import Axes
+from scipy.integrate import trapezoid
 
 from tetra_drake.figures.style import (
     OKABE_ITO,
@@ -171,7 +172,7 @@ def _draw_speed(panel: Axes, trajectory: xarray.Dataset, result: SimulationResul
         speed = velocity[0] * np.cos(heading) + velocity[1] * np.sin(heading)
         name = "forward speed"
     speed = speed / unit.length
-    mean = float(np.trapezoid(speed, times) / np.ptp(times))
+    mean = float(trapezoid(speed, times) / np.ptp(times))
     panel.axhline(0.0, color="0.8", linewidth=0.5)
     panel.axhline(mean, **REFERENCE)
     panel.plot(times, speed, color="black", linewidth=1.1, linestyle="-")
