@@ -212,6 +212,15 @@ def test_a_regulator_damps_the_slow_swing_of_a_load_on_a_long_rope():
         linearize(scenario_of(tree)).lqr(np.eye(12), [[cost]])
 
 
+def test_the_gain_of_a_mast_is_found_at_the_highest_cost():
+    # With a high cost Q = q 1 the slowest motion has the rate -1 /s: x and x' cost the same.
+    linear = linearize("mast")
+    gain = linear.lqr(1e10 * np.eye(48), np.eye(12))
+    assert np.linalg.eigvals(linear.system.A() - linear.system.B() @ gain).real.max() == (
+        pytest.approx(-1.0, abs=0.01)
+    )
+
+
 def test_gains_grow_as_the_root_of_a_high_cost():
     gains = [prism().lqr(cost * np.eye(36), np.eye(6)) for cost in (1e8, 1e10)]
     assert gains[1] == pytest.approx(10.0 * gains[0], abs=0.02 * np.abs(gains[1]).max())

@@ -58,19 +58,6 @@ def test_body_poses_carry_the_nodes(trajectory: xarray.Dataset, structure: Struc
     np.testing.assert_allclose(p_WN, trajectory.p_WN.values, atol=1e-6)
 
 
-def test_forces_are_those_of_the_states(trajectory: xarray.Dataset, structure: Structure) -> None:
-    assert (trajectory.signal.sel(time=slice(0.0, 1.2)) == 0.0).all()
-    assert (abs(trajectory.signal.sel(time=slice(1.3, 2.0))) > 0.0).any()
-    # Normal force only where a node is below the ground, friction only in contact (modes are
-    # those of the step, so a node just lifting or landing may differ at single samples).
-    above = trajectory.p_WN.values[:, structure.contacts, 2] > 0.0
-    normal = trajectory.normal_force.values
-    assert (normal[above] == 0.0).all() and (normal[~above] > 0.0).any()
-    airborne = trajectory.in_contact.values == 0
-    assert (trajectory.friction_force.values[airborne] == 0.0).all()
-    assert np.mean(airborne != above) < 0.05
-
-
 def test_bodies_nodes_and_cables_of_any_structure_have_names() -> None:
     robot = prism.make_prism()
     motion = prism.slide_prism(robot, duration=0.1)
