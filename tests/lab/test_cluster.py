@@ -36,6 +36,18 @@ def cluster(one_cluster):
 
 
 @pytest.mark.slow
+def test_a_gait_that_ends_its_worker_ends_the_run(cluster, tasks, monkeypatch, refused):
+    monkeypatch.setattr(cluster.scheduler, "allowed_failures", 1)
+    with (
+        refused("worker processes", "", "died"),
+        dask_cluster(cluster) as make,
+        on_executor(analytic.Dying(12), make, 2) as evaluator,
+    ):
+        for task, evaluation in evaluate_all(evaluator, tasks):
+            assert evaluation == analytic.Bowl()(task)
+
+
+@pytest.mark.slow
 def test_only_this_machine_can_reach_the_cluster(cluster):
     for address in (cluster.scheduler_address, cluster.dashboard_link):
         port = urlsplit(address).port
