@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tetra_drake.robot.remarks import gain_remark, stillness_remark
+from tetra_drake.robot.remarks import centre_remark, gain_remark, stillness_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
@@ -53,3 +53,16 @@ def test_a_robot_that_stands_still_is_told_why():
     assert gain_remark(robot_of("prism", cpg_gain=f"{0.98 * needed} N"))
     assert not gain_remark(robot_of("prism", cpg_gain=f"{1.02 * needed} N"))
     assert "%" not in stillness_remark(robot_of("winch"), moved(0.0, limited=0.01))
+
+
+@pytest.mark.parametrize(("aside", "shown"), [("0 mm", ""), ("20 mm", "0.6667 cm")])
+def test_a_centre_of_mass_beside_a_bar_is_named(aside, shown):
+    # One of three bodies of equal masses has its centre beside the line of its nodes. The bar from
+    # (0.1, 0, 0) to (-0.0866, 0.05, 0.16) m is at right angles to (0.259, 0.966, 0).
+    middle, across = (0.00670, 0.025, 0.08), (0.2588, 0.9659, 0.0)
+    way = float(aside.split()[0]) / 1e3
+    centre = [f"{m + way * c} m" for m, c in zip(middle, across, strict=True)]
+    body = {"struts": ["bar n0 n4"], "centre": centre}
+    robot = robot_of("prism", robot_bodies={"b": body})
+    assert robot.structure.node_shares.sum() == pytest.approx(1.0, rel=1e-9)
+    assert shown in (remark := centre_remark(robot)) and bool(remark) == bool(shown)

@@ -155,10 +155,10 @@ class Planner:
             self.limits = np.stack([known.min(axis=0), known.max(axis=0)])
         if limits is not None:
             shape = self.limits.shape
-            own = checked_numbers(limits, shape, (2, 1), source=source, key="limits", finite=True)
+            own = checked_numbers(limits, shape, (2, 1), source=source, key="limits")
             self.limits = np.broadcast_to(own, shape)
-        if (self.limits[0] > self.limits[1]).any():
-            raise InputError(source, "limits", "expected the least actions first")
+        if not (np.isfinite(self.limits).all() and (self.limits[0] <= self.limits[1]).all()):
+            raise InputError(source, "limits", "expected finite numbers, the least actions first")
 
         times, grid = step * np.arange(self._steps), np.linspace(0.0, horizon, knots)
         self._between, self._shift = _shares(times, grid), _shares(grid + pause, grid)

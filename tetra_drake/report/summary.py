@@ -13,6 +13,7 @@ from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.formatting import TextTable, fixed, rounded, sentence, uncertain
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.remarks import (
+    centre_remark,
     overload_remark,
     sinking_remark,
     start_up_remark,
@@ -110,6 +111,7 @@ def result_text(result: SimulationResult) -> str:
     robot = result.robot
     still = stillness_remark(robot, vars(metrics)) if result.gait else ""
     remarks = [start_up_remark(robot) or still, sinking_remark(robot), yielding_remark(robot)]
+    remarks.append(centre_remark(robot))
     if result.recorded is not None:
         remarks.append(overload_remark(robot, result.trajectory.tension.max("time").values))
     lines += [sentence(remark) for remark in remarks if remark]

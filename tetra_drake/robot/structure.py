@@ -188,15 +188,16 @@ class Structure(Blueprint):
     def node_shares(self) -> np.ndarray:
         """Factors of the nodes (nodes,), without unit, for the robot's centre of mass: in every
         pose of the bodies it is the sum of the node positions times these factors. They are 0 for
-        fixed nodes, and may be negative."""
+        fixed nodes, may be negative, and their sum is 1."""
         *of_bodies, fixed = np.split(self.p_BN, self.first_node[1:])
         shares = []
         for p_BN, mass in zip(of_bodies, self.mass, strict=True):
-            # The weighted sum of the nodes of a body is its origin, the centre of mass.
-            conditions = np.vstack([p_BN.T, np.full(len(p_BN), np.abs(p_BN).max() or 1.0)])
-            origin = [0.0, 0.0, 0.0, conditions[3, 0]]
+            # Weights with the sum 1, whose weighted sum of the nodes is the body's origin, the
+            # centre of mass, or next to it where a given centre is beside all nodes.
+            middle = p_BN.mean(axis=0)
+            weights = 1.0 / len(p_BN) - np.linalg.lstsq((p_BN - middle).T, middle, rcond=1e-9)[0]
             # Rounded, because LAPACK's last digits depend on the processor.
-            shares.append(mass * np.linalg.lstsq(conditions, origin)[0].round(12))
+            shares.append(mass * weights.round(12))
         return np.concatenate([*shares, np.zeros(len(fixed))]) / self.mass.sum()
 
     @property
