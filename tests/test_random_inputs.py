@@ -5,6 +5,7 @@
 
 import contextlib
 import copy
+import dataclasses
 import functools
 import io
 import json
@@ -16,7 +17,9 @@ import traceback
 from collections import Counter
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from typing import Any, ClassVar
 
+import bench
 import numpy as np
 import pytest
 import yaml
@@ -30,9 +33,11 @@ from tetra_drake.engines.drake import MakeDisturbedSimulator, MakeSimulator
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.lab.bridges.conversion import converted
 from tetra_drake.lab.gym.environments import TensegrityVectorEnv
+from tetra_drake.laws.terrain import Grid, Relief
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.policies import PolicyKind
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -155,6 +160,62 @@ def begun(rng, folder):
     td.simulate(PRISM.with_changes(changes), td.seeded_gait(PRISM, 1))
 
 
+class Given(PolicyKind):
+    """A policy of a plug-in with answers that do not fit."""
+
+    answer: ClassVar[Any] = None
+    bounds: ClassVar[Any] = 0.0, 1.0
+
+    def parameters(self, blueprint):
+        return {"p": self.bounds}
+
+    def signals(self, robots, readings, values):
+        return self.answer
+
+
+class Surface(Relief):
+    """A terrain of a plug-in with heights that do not fit."""
+
+    given: ClassVar[Any] = None
+
+    def grid(self, *, ahead, scale, source):
+        return self.given
+
+
+def plugged(rng, folder):
+    Given.answer, Given.bounds = (
+        rng.choice([*ODD, np.zeros((1, 6))]),
+        rng.choice([*ODD, (0.0, 1.0)]),
+    )
+    odd_grid = odd(rng, heights=np.zeros((3, 3)), start=(-1.0, -1.0), cell=(1.0, 1.0))
+    Surface.given = rng.choice([Grid(*odd_grid.values()), *ODD])
+    section = rng.choice([{"policy": Given()}, {"terrain": Surface()}])
+    scenario = PRISM.with_sections(**section)
+    td.simulate(scenario, td.seeded_gait(scenario, 1))
+
+
+def entered(rng, folder):
+    body = rng.choice(
+        [
+            "return answer",
+            "problem.evaluate(answer)",
+            "problem.spend(answer)",
+            "problem.left = 1e9",
+            "raise ValueError(answer)",
+            "raise SystemExit(answer)",
+            "return lambda now, readings: answer",
+        ]
+    )
+    text = f"def solve(problem, seed):\n    answer = {rng.choice(PLAIN)!r}\n    {body}\n"
+    text += rng.choice(
+        ["", f"TASKS = {rng.choice(PLAIN)!r}\n", f"CHANGES = {rng.choice(PLAIN)!r}\n"]
+    )
+    (folder / "own.py").write_text("from math import inf, nan\n" + text)
+    entry = bench.Entry.of(folder / "own.py")
+    task = dataclasses.replace(bench.TASKS[0], changes={"simulation.duration": "2 s"})
+    bench.solved(entry, task, [0], episodes=1)
+
+
 def stepped(rng, folder):
     given = odd(rng, count=2, control_period=0.1, record=False, workers=1)
     simulation = td.Simulation(rng.choice([PRISM, PRISM, *ODD]), **given)
@@ -249,6 +310,8 @@ SURFACES = {
         **odd(r, scenario=PRISM.with_changes(SPREAD), gait=made()[5], generator=RandomGenerator(1))
     ),
     "commands": commanded,
+    "plug-ins": plugged,
+    "bench": entered,
     "Simulation": stepped,
     "gym": played,
     "springs": sprung,
