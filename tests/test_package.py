@@ -69,17 +69,3 @@ def test_links_and_pictures_survive_on_an_index_of_packages(readme):
     assert f'<img src="{address}/raw/v1.2.3/runs/champion/walking.gif" width="380" alt="' in text
     assert f"]({address}/blob/v1.2.3/tetra_drake/scenario/KEYS.md#metrics)" in text
     assert len(targets(text)) == len(targets(read("README.md")))
-
-
-def test_without_an_address_nothing_is_broken(readme):
-    text = readme.for_index(read("README.md"), None, "1.2.3")
-    assert all(target.startswith("https://") for target in targets(text))
-    assert "the thesis's robot walking" in text and "<img" not in text
-
-
-def test_the_address_is_the_given_one_or_the_workflows(readme, monkeypatch):
-    assert readme.repository_of({}) is None
-    monkeypatch.setenv("GITHUB_SERVER_URL", "https://code.example")
-    monkeypatch.setenv("GITHUB_REPOSITORY", "someone/fork")
-    assert readme.repository_of({}) == "https://code.example/someone/fork"
-    assert readme.repository_of({"Source": "https://own.example"}) == "https://own.example"

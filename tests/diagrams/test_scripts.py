@@ -15,13 +15,10 @@ import single_oscillator
 import sliding_tetrahedron
 import tetrahedron_on_incline
 from helpers.shorter import shortened
-from pydrake.geometry import MeshcatParams
 from tables import aspect
 
 import tetra_drake
 from tetra_drake import systems
-from tetra_drake.scenario.load import load_scenario
-from tetra_drake.visualization.replay import quiet_meshcat
 
 SCRIPTS = [
     (single_oscillator, {"weights": [1.0, 2.0], "ratios": [3.0]}, 3),
@@ -59,16 +56,6 @@ def test_the_loop_on_one_screen_ends_with_a_replay(tmp_path, monkeypatch, capsys
     assert (tmp_path / "evolution.html").is_file()
     code = Path(evolution.__file__).read_text(encoding="utf-8")
     assert len(code.splitlines()) <= 50
-
-
-def test_signals_and_bodies_are_shown_live():
-    meshcat, scenario = quiet_meshcat(MeshcatParams(host="localhost")), load_scenario("thesis")
-    sliding_tetrahedron.slide(scenario, duration=2e-3, meshcat=meshcat)
-    assert meshcat.HasPath("/signals/5") and meshcat.HasPath("/robot/T1")
-    shown = single_oscillator.make_diagram(scenario, meshcat=meshcat)
-    meshcat.Delete("/signals")
-    single_oscillator.simulate(shown, 0.2)
-    assert meshcat.HasPath("/signals/0") and not meshcat.HasPath("/signals/1")
 
 
 CHECKOUT = Path(__file__).parents[2]

@@ -15,7 +15,6 @@ from one_tetrahedron import BASE, let_go, make_standing_tetrahedron, start_axes,
 
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.settings.units import INCH
 
 
 def centre_velocity(motion, scenario):
@@ -41,12 +40,6 @@ def test_below_the_coefficient_it_stays():
     np.testing.assert_allclose(motion.friction_forces[-1, :, 0], third, rtol=2e-5)
 
 
-def test_without_stiffness_it_creeps():
-    scenario = incline.on_incline(incline.GENTLE, stiffness=0.0)
-    motion = incline.simulate(scenario, duration=0.2)
-    assert motion.velocity[-1] == pytest.approx(-incline.creep_speed(scenario), rel=1e-6)
-
-
 def test_above_the_coefficient_it_slides():
     scenario = incline.on_incline(incline.STEEP)
     assert math.tan(incline.STEEP) > incline.STATIC > incline.KINETIC
@@ -64,25 +57,6 @@ def test_above_the_coefficient_it_slides():
     settled = motion.times > 0.2
     slope, _ = np.polyfit(motion.times[settled], motion.velocity[settled], 1)
     assert slope == pytest.approx(a, rel=1e-6)
-
-
-def test_thrown_uphill_it_stops_and_stays():
-    scenario = incline.on_incline(incline.GENTLE)
-    motion = incline.simulate(scenario, speed=incline.SPEED, duration=0.35)
-    a = incline.acceleration(scenario, way=1.0)
-    time, way = motion.stopping()
-    ups = slips(motion) & (motion.times < -incline.SPEED / a - 1e-3)
-    np.testing.assert_allclose(motion.friction_ratio[ups], -incline.KINETIC, rtol=1e-12)
-    v, t = centre_velocity(motion, scenario)[ups], motion.times[ups]
-    gain = v[:, 0] + incline.KINETIC * v[:, 2]
-    np.testing.assert_allclose(gain - gain[0], a * (t - t[0]), atol=1e-9 * incline.SPEED)
-    # Below mu F_N / c, at most 1.5 mm/s, friction is damping, and the body rocks: 0.7 ms more.
-    assert time == pytest.approx(-incline.SPEED / a, abs=1e-3)
-    assert way == pytest.approx(-(incline.SPEED**2) / (2.0 * a), abs=5e-3 * INCH)
-    rest = motion.times > time
-    after = motion.travel[rest]
-    assert after.max() - after.min() < 2.0 * incline.deflection(scenario)
-    assert abs(motion.velocity[-1]) < 1e-3 * incline.creep_speed(scenario)
 
 
 FACTORS = {"forward": 1.5, "backward": 2.0, "lateral": 0.5}

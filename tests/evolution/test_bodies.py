@@ -49,18 +49,6 @@ def run(prism, tmp_path_factory):
 
 
 @pytest.mark.parametrize("kind", LEARNING)
-def test_a_body_with_equal_bounds_changes_no_fitness(tmp_path, prism, kind):
-    changes = {"cpg.gain": "8 N", "optimizer": kind, "evolution.evaluations": 12, "evolve": {}}
-    alone = prism.with_changes(changes)
-    bounds = {SIDE: ["100 N/m"] * 2, "cpg.gain": ["8 N"] * 2}
-    pair = alone, alone.with_changes({"name": "fixed", "evolve": bounds})
-    runs = [evolve(s, tmp_path / s.name, reevaluate=False, report=False) for s in pair]
-    assert dict(runs[1].best_gait().body) == {SIDE: "100.0 N/m", "cpg.gain": "8.0 N"}
-    first, second = (each.evaluations["fitness"].tolist() for each in runs)
-    assert first == second and len(set(first)) == 12
-
-
-@pytest.mark.parametrize("kind", LEARNING)
 def test_a_stiffness_is_found_whose_best_is_known(tmp_path, kind):
     """A bar hangs its weight over the stiffness below the free length of its cable."""
     changes = {"cpg.start_up": "1 s", "simulation.steady_from": "0.01 s", "optimizer": kind}

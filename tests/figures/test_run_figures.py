@@ -1,7 +1,5 @@
 """Figures of a run show what its record holds."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from helpers.synthetic_run import PER_DISTANCE, write_map, write_run
@@ -71,12 +69,6 @@ def test_fitness_lines_are_the_recorded_means_over_evaluations(run_of):
         "trial 1": [[2, 3.0], [4, 5.0]],
         "trial 2": [[2, 7.0], [3, 8.0]],
     }
-
-
-def test_the_best_fitness_is_shown_where_the_optimiser_reports_no_mean(run_of):
-    run = run_of([[(1.0, 0), (3.0, 1)], [(2.0, 0)], [(4.0, 0)]])
-    run = dataclasses.replace(run, iterations=run.iterations.drop(columns="mean_fitness"))
-    assert lines(fitness_of_trials(run)) == {"trial 0": [[2, 3.0], [3, 3.0], [4, 4.0]]}
 
 
 MEANS = [[1.0, 2.0], [3.0, 4.0, 5.0, 8.0], [4.0, 4.0, 4.0, 4.0], [6.0, 7.0, 9.0]]

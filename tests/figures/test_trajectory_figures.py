@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers import prism
 from helpers.drawn import result_of
-from helpers.made_up_walk import HEIGHT, LOAD, PERIOD, SPEED, make_row, make_walk
+from helpers.made_up_walk import HEIGHT, PERIOD, SPEED, make_row, make_walk
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 
@@ -18,15 +18,10 @@ from tetra_drake.figures.motion import (
     time_lapse,
 )
 from tetra_drake.figures.style import OKABE_ITO
-from tetra_drake.laws.friction import Coulomb
-from tetra_drake.laws.terrain import Steps
-from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.measures import intervals, last_step
 from tetra_drake.scenario.robot_tetrahedra import STRUTS
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
-STAIRS = Steps(height=-INCH, depth=6.0 * INCH, count=9)
-DOWNSTAIRS = {"robot.contacts": "all", "friction": Coulomb(), "terrain": STAIRS}
 ROW = make_row()
 
 
@@ -34,12 +29,6 @@ ROW = make_row()
 def walk():
     """A walk of five tetrahedra, which no test may change."""
     return make_walk()
-
-
-def with_all_contacts(walk):
-    """The walk, with the nodes that never touch the ground as contacts, too."""
-    every = walk.drop_vars("contact_body").reindex(contact=walk.node.values, fill_value=0)
-    return every.assign_coords(contact_body=("contact", walk.node_body.values))
 
 
 def row(trajectory):
@@ -170,36 +159,6 @@ def test_ground_forces_are_those_of_the_time_shown(walk):
     np.testing.assert_allclose(normal.get_xdata(), end.time)
     np.testing.assert_allclose(normal.get_ydata(), expected)
     np.testing.assert_allclose(friction.get_ydata(), -0.5 * expected)
-
-
-def test_stance_is_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk):
-    four = walk.sel(time=slice(0.0, 4 * PERIOD)).copy(deep=True)
-    four.normal_force[int(np.argmin(np.abs(four.time.values - 5.5))), 0] = 100.0 * LOAD
-    panel, *_ = ground_forces(row(four)).axes
-    spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches]
-    np.testing.assert_allclose(spans[-2:], [(5.0, 6.0), (7.0, 8.0)], atol=0.011)
-    np.testing.assert_allclose(panel.lines[-1].get_xdata(), [5.0, 7.0], atol=0.011)
-    assert LOAD / POUND_FORCE < panel.get_ylim()[1] < 2.0 * LOAD / POUND_FORCE
-
-
-def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
-    robot = make_row(changes=DOWNSTAIRS)
-    for side in pictures(one_step(result_of(robot, with_all_contacts(walk)), instants=3)):
-        [line] = [line for line in side.lines if len(line.get_xdata()) > 300]
-        x, z = line.get_xdata(), line.get_ydata()
-        expected = ground_heights(np.column_stack([x, 0.0 * x]) * INCH, robot.ground) / INCH
-        np.testing.assert_allclose(z - z[0], expected - expected[0], rtol=0, atol=1e-9)
-        assert np.ptp(z) > 0.9  # the robot's tip is above the first step down
-
-
-def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(walk):
-    every = with_all_contacts(walk)
-    every.normal_force.loc[{"contact": "T2 tip"}][-10:] = LOAD
-    every.normal_force.loc[{"contact": "T3 tip"}][:10] = LOAD  # before the time shown
-    every.normal_force.loc[{"contact": "T4 bottom_right"}] *= 0.5
-    shown = {panel.get_title("left") for panel in ground_forces(row(every)).axes}
-    alike = {f"T{i} left = right" for i in (1, 2, 3, 5)}
-    assert shown == alike | {"T2 tip", "T4 left", "T4 right"}
 
 
 def test_of_a_structure_that_is_no_row_the_centre_is_shown():

@@ -1,6 +1,5 @@
 """The pages in a real browser, headless and without network."""
 
-import contextlib
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -122,13 +121,3 @@ def test_a_video_has_its_size_rate_and_speed(browser, replay, tmp_path, name, vi
     about, *frames = reader(str(tmp_path / name))
     assert about["size"] == (320, 180) and about["fps"] == pytest.approx(10.0)
     assert len(frames) == 5 and frames[0] != frames[-1]
-
-
-def test_a_page_without_its_viewer_says_how_to_get_it(browser, trajectory, tmp_path):
-    path, viewer = tmp_path / "replay.html", tmp_path / "meshcat.js"
-    save_replay(path, robot=ROBOT, trajectory=trajectory, title="a: b", viewer=viewer)
-    viewer.unlink()
-    with contextlib.closing(browser.new_page()) as page:
-        page.goto(path.as_uri())
-        page.wait_for_function("document.body.innerText.includes('tetra-drake replay')")
-        assert "meshcat.js" in page.locator("body").inner_text()

@@ -11,7 +11,6 @@ from tetra_drake.cli import main
 from tetra_drake.lab.comparison import (
     compare,
     compare_scenarios,
-    comparison,
     comparison_text,
     improvement_over,
 )
@@ -164,16 +163,6 @@ def test_different_objectives_and_runs_given_twice_are_refused(run, refused):
     failed = run("d", trial(None))
     with refused(failed, "", "fitness"):
         compare([failed])
-
-
-def test_the_figure_has_a_line_for_each_run(run):
-    fitnesses = [float(number) for number in range(30)]
-    paths = [run("a", trial(*fitnesses), trial(*fitnesses[::2])), run("b", trial(4.0, 5.0))]
-    left, right = comparison(compare(paths, reach=5.0 * INCH)).axes
-    assert [line.get_xydata().tolist()[-1] for line in left.lines] == [[30.0, 28.5], [2.0, 5.0]]
-    # 5 in are fitness 10: evaluations 11 and 6.
-    assert right.lines[0].get_xydata().tolist()[1:] == [[6.0, 50.0], [11.0, 100.0], [30.0, 100.0]]
-    assert right.lines[1].get_ydata().tolist() == [0.0, 0.0]
 
 
 def test_the_command_has_a_distance_to_reach_and_writes_what_it_found(run, tmp_path):

@@ -13,7 +13,6 @@ import pytest
 import yaml
 from helpers.anchored import HUNG, scenario_of, supported_prism
 from helpers.converged import shortly
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from tetra_drake.cli import main
@@ -22,7 +21,6 @@ from tetra_drake.formatting import silent
 from tetra_drake.lab.fit import measurements
 from tetra_drake.lab.fit.fit import fit
 from tetra_drake.lab.fit.measurements import MotionCapture, Prediction, Rest
-from tetra_drake.lab.fit.placement import unknowns_of
 from tetra_drake.lab.fit.problem import FitProblem, Parameter
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.command_file import command_text, load_command, table_text
@@ -490,10 +488,3 @@ def test_stiffness_damping_and_friction_of_a_sliding_robot_are_within_their_inte
         table = fit(scenario, [captured(log, tmp_path)], SLIDING).parameters
         inside += (table["low"] <= truth) & (truth <= table["high"])
     assert (inside >= 90).all(), inside
-
-
-def test_a_search_that_does_not_converge_is_refused(refused):
-    ended = [least_squares(np.cos, [1.0], max_nfev=most) for most in (1, 100)]
-    with refused("fit", "frame", "converge"):
-        unknowns_of(ended[0], "frame")
-    assert unknowns_of(ended[1], "frame") == pytest.approx([math.pi / 2], abs=1e-6)

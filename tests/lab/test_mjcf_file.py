@@ -216,18 +216,6 @@ def test_a_scenario_and_other_commands_tell_how_to_convert_a_file(tmp_path: Path
             read(name)
 
 
-def test_a_file_of_an_earlier_mujoco_means_the_same(tmp_path: Path) -> None:
-    settings = '<compiler coordinate="global"/><option><flag sensornoise="disable"/></option>'
-    old = TEXTS["tethered"].format(settings, 'pos="0 0 1"', "0.1 0 1")
-    (tmp_path / "part").write_text(old)
-    (tmp_path / "old.xml").write_text('<mujoco><include file="part"/></mujoco>')
-    (tmp_path / "new.xml").write_text(TEXTS["tethered"].format("", "", "0.1 0 0"))
-    included, new = (converted(tmp_path / f"{name}.xml") for name in ("old", "new"))
-    assert new.blueprint().p_WN.tolist() == [[0.1, 0, 1], [0, 0, 0]]
-    assert [included.nodes, included.bodies] == [new.nodes, new.bodies]
-    assert "sensornoise" in str(included.ignored)
-
-
 def test_without_mujoco_the_error_says_how_to_install_it(monkeypatch, tmp_path, refused) -> None:
     (tmp_path / "a.xml").write_text(TEXTS["others"])
     monkeypatch.setitem(sys.modules, "mujoco", None)
@@ -241,12 +229,3 @@ def test_other_files_are_refused_in_one_line(text, key, fact, tmp_path, refused)
     os.mkfifo(tmp_path / "pipe.stl")
     with refused(tmp_path / "a.xml", key, fact):
         converted(tmp_path / "a.xml")
-
-
-def test_what_loose_tendons_are_called_is_told(tmp_path, refused) -> None:
-    text = TEXTS["others"].replace("stiffness", "damping").replace("biasprm", "user")
-    text = text.replace('limited="true" range="0 9"', "")
-    for t4, fact in (("t4", "limit, left out: t1, t2, t4"), ("t4" * 99, "itself, left out: t3")):
-        (tmp_path / "a.xml").write_text(text.replace("t4", t4))
-        with refused(tmp_path / "a.xml", "tendon", fact):
-            converted(tmp_path / "a.xml")

@@ -99,14 +99,6 @@ def test_boxes_spheres_on_cables_bodies_held_in_space_and_names_of_places(caplog
     assert all(name in caplog.text for name in (": spare", ": ceiling", ": bar", ": u v, a b"))
 
 
-def test_of_several_builders_the_last_counts_and_bonds_have_the_names_of_their_parts(tmp_path):
-    string = "{class: tgBasicActuatorInfo, parameters: {stiffness: 3}}"
-    given = read(write(tmp_path, f"{TEXTS['prism']}  string: {string}"))
-    assert given.cables["vertical/string"].stiffness == 3.0
-    given = read(write(tmp_path, f"{TEXTS['spine']}builders: {{string v1/v2: {string}}}"))
-    assert sorted(group.stiffness for group in given.cables.values()) == [3.0, 1000.0]
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("entry", "front", "lowest"), ROWS["places"])
 def test_places_of_substructures(entry, front, lowest, tmp_path) -> None:
@@ -151,23 +143,6 @@ def test_a_structure_that_multiplies_is_refused_before_it_is_whole(part, tmp_pat
     with pytest.raises(InputError) as caught:
         read(tmp_path / "level8.yaml")
     assert caught.value.key == ("nodes" if "nodes" in part else "substructures")
-
-
-def test_a_substructure_may_have_no_nodes(tmp_path: Path) -> None:
-    """Such as one that holds builders only."""
-    write(tmp_path, "builders: {rod: {class: tgRodInfo, parameters: {radius: 2}}}", "builders.yaml")
-    entry = "{path: builders.yaml, rotation: {axis: [0, 1, 0], angle: 90}, translation: [1, 0, 0]}"
-    given = read(write(tmp_path, f"{TEXTS['vertebra']}\nsubstructures: {{kinds: {entry}}}"))
-    assert given.struts["rod"].diameter == pytest.approx(0.4)
-
-
-def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path, refused) -> None:
-    part = write(tmp_path, TEXTS["vertebra"].replace("left:", "lleft:"), "vertebra.yaml")
-    with refused(part, "pair_groups.rod[3]"):
-        read(tmp_path / "spine.yaml")
-    part.unlink()
-    with refused(part, ""):
-        read(tmp_path / "spine.yaml")
 
 
 def test_the_structure_names_settings_that_the_scenario_replaces(tmp_path, caplog):

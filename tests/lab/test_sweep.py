@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import pytest
-from helpers.anchored import HUNG, scenario_of
 from helpers.converged import shortly
 
 from tetra_drake.engines.simulate import simulate
@@ -23,15 +22,6 @@ STIFFNESS = "robot.cables.outer_stiffness"
 @pytest.fixture(scope="module")
 def short() -> Scenario:
     return shortly(load_scenario("thesis"), 0.4, engine="!Compiled")
-
-
-def test_a_load_is_an_axis() -> None:
-    loaded = scenario_of(HUNG | {"loads": {"a": [0.0, 0.0, -0.1]}}, duration=0.5)
-    changes = {"robot.loads.a[2]": ["-0.1 N", "-0.4 N"]}
-    found = sweep(loaded, seeded_gait(loaded, 3), changes, workers=1)
-    assert found["a[2]"].values.tolist() == [-0.1, -0.4]
-    assert found["a[2]"].units == "N"
-    assert float(found.tension[0, 0]) != float(found.tension[1, 0])
 
 
 def test_each_key_is_a_labelled_axis_of_the_numbers_of_single_simulations(short: Scenario) -> None:

@@ -11,7 +11,6 @@ from helpers.made_up_walk import make_walk
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.results.trajectory import VARIABLES, sample_times
 from tetra_drake.robot.gait_file import load_gait
-from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 
 
@@ -44,31 +43,6 @@ def test_positions_and_velocities_agree_between_samples(trajectory: xarray.Datas
     early = trajectory.sel(time=slice(0.6, 1.2))
     rates = (early.p_WN.values[2:] - early.p_WN.values[:-2]) / 0.02
     np.testing.assert_allclose(rates, early.v_WN.values[1:-1], atol=5e-5)
-
-
-def test_body_poses_carry_the_nodes(trajectory: xarray.Dataset, structure: Structure) -> None:
-    # R r = r + 2 w (e x r) + 2 e x (e x r) for the unit quaternion (w, e).
-    carriers = structure.carriers
-    q_WB = trajectory.q_WB.values[:, carriers]
-    w, e = q_WB[..., :1], q_WB[..., 1:]
-    turned = 2.0 * np.cross(e, structure.p_BN)
-    rotated = structure.p_BN + w * turned + np.cross(e, turned)
-    p_WN = trajectory.p_WB.values[:, carriers] + rotated
-    # Drake does not keep quaternions at length 1; it is left by the accuracy of its steps.
-    np.testing.assert_allclose(p_WN, trajectory.p_WN.values, atol=1e-6)
-
-
-def test_forces_are_those_of_the_states(trajectory: xarray.Dataset, structure: Structure) -> None:
-    assert (trajectory.signal.sel(time=slice(0.0, 1.2)) == 0.0).all()
-    assert (abs(trajectory.signal.sel(time=slice(1.3, 2.0))) > 0.0).any()
-    # Normal force only where a node is below the ground, friction only in contact (modes are
-    # those of the step, so a node just lifting or landing may differ at single samples).
-    above = trajectory.p_WN.values[:, structure.contacts, 2] > 0.0
-    normal = trajectory.normal_force.values
-    assert (normal[above] == 0.0).all() and (normal[~above] > 0.0).any()
-    airborne = trajectory.in_contact.values == 0
-    assert (trajectory.friction_force.values[airborne] == 0.0).all()
-    assert np.mean(airborne != above) < 0.05
 
 
 def test_bodies_nodes_and_cables_of_any_structure_have_names() -> None:

@@ -159,17 +159,6 @@ def test_parameters_have_the_bounds_and_floors_of_the_thesis_and_gains_no_floor(
     assert gait.parameters.items() >= (gains | {"tau_A": 27.0, "tau_B": 28.0}).items()
 
 
-def test_repair_couples_tau_b_unless_it_is_independent(scenario):
-    vector = np.linspace(1.0, 2.0, 26)
-    space = ParameterSpace.of(scenario)
-    repaired = space.repair(vector)
-    assert repaired[TAU_B] == 2.0 * vector[TAU_A]
-    np.testing.assert_array_equal(repaired[:TAU_B], vector[:TAU_B])
-    assert vector[TAU_B] == 2.0
-    scenario = scenario.with_changes({"gait_bounds.independent_tau_b": True})
-    np.testing.assert_array_equal(ParameterSpace.of(scenario).repair(vector), vector)
-
-
 def test_random_gaits_are_uniform_within_the_bounds(scenario):
     generator, space = np.random.default_rng(5), ParameterSpace.of(scenario)
     vectors = np.array([space.random(generator) for _ in range(2000)])

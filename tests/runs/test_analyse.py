@@ -66,19 +66,3 @@ def test_sensitivity_is_of_each_gait_and_grows_with_the_displacement(folder, mon
     monkeypatch.setattr(analyse, "DISPLACEMENT", 1e-6)
     further = analyse.sensitivity(run.scenario, gaits, workers=1)
     assert all(100.0 < a / b < 10_000.0 for a, b in zip(further, recorded, strict=True))
-
-
-def test_gaits_walk_on_unseen_ground_and_may_miss_requirements_there(folder, monkeypatch):
-    monkeypatch.setattr(analyse, "UNSEEN", range(1001, 1003))
-    run = load_run(folder)
-    gaits = {0: run.gait(0, 2), 2: run.gait(2, 0)}
-    ground = {"terrain": load_scenario("rough").terrain, "require": {"clearance": "0 in"}}
-    rough = run.scenario.with_changes(ground)
-    rows = analyse.on_unseen_ground(rough, gaits, workers=1)
-    assert len(rows) == 4
-    for row in rows:
-        unseen = rough.with_changes({"terrain.seed": row["seed"]})
-        walked = simulate(scenario=unseen, gait=gaits[row["trial"]])
-        assert row["distance_in"] == walked.metrics.distance_in and row["met"]
-    apart = rough.with_changes({"require": {"clearance": "6 in"}})
-    assert not any(row["met"] for row in analyse.on_unseen_ground(apart, gaits, workers=1))

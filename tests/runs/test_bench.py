@@ -39,14 +39,6 @@ def test_an_entry_is_a_file_and_its_score_is_that_of_its_solution(tmp_path):
     assert record["second"] == pytest.approx(record["score"], abs=0.1)  # in MuJoCo
 
 
-def test_an_entry_may_change_the_scenarios_of_its_tasks(tmp_path):
-    bounds = "gait_bounds.weight_min", "gait_bounds.weight_max"
-    entry = entry_of(tmp_path, ENTRY + f"CHANGES = dict.fromkeys({bounds}, 2.0)\n")
-    (record,) = bench.solved(entry, WALK, [3], episodes=2)
-    assert record["parameters"][:24] == [2.0] * 24
-    assert WALK.scored(np.array(record["parameters"])) == pytest.approx(record["score"], abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("text", "key"),
     [

@@ -35,21 +35,6 @@ def test_trials_turn_to_the_side_of_the_map_that_still_walks_and_end():
     assert len(tried) < damage.SET["trials"] and after[tried].max() > 0.9 * after.max()
 
 
-def test_a_strong_trial_pulls_harder_in_the_same_rhythm_without_the_cable():
-    gait = damage.steered(load_once(damage.WALKER).best_gait(), 0.0)
-    weak, strong = (damage.Trial(gait, each) for each in (1.0, 1.5))
-    cable = "T1-T2 outer top"
-    robots = [trial.on(damage.scenario(), cable) for trial in (weak, strong)]
-    signals = [
-        simulate(
-            robot.with_changes({"simulation.duration": "3 s"}), weak.gait, record=True
-        ).trajectory.signal.values
-        for robot in robots
-    ]
-    np.testing.assert_allclose(signals[1], 1.5 * signals[0], rtol=1e-9, atol=1e-9)
-    assert [event.cut for event in robots[0].events] == [[cable]]
-
-
 def test_the_page_is_made_from_the_records():
     records = map(damage.read, (damage.WALKS, damage.PLANS, damage.CANDIDATES))
     assert damage.page(*records) == (damage.HERE / "README.md").read_text("utf-8")

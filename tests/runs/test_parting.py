@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-import pandas
 import pytest
 from helpers.recorded import recorded_run
 from parting import asked, partings
@@ -39,15 +38,3 @@ def test_a_run_does_not_part_from_itself_nor_where_only_distances_differ(run):
         assert found["alike"].equals(found["evaluations"])
         assert (found["first_best"] == found["second_best"]).all()
         assert (found["apart"] == 0.0).all() and (found["farthest"] >= apart).all()
-
-
-def test_trials_part_soon_after_a_gait_seems_the_best(run):
-    """It is then chosen as a parent in a tenth of the tournaments, and stays in the population."""
-    found = partings(changed(run, fitness=99.0), run)
-    assert (found["alike"] >= CHANGED + 2).all(), "the gaits of that iteration are the same"
-    assert (found["alike"] < CHANGED + 400).all()
-    walked = run.evaluations.query("index == @CHANGED")["distance_in"]
-    pandas.testing.assert_series_equal(
-        found["first_best"], walked, check_index=False, check_names=False
-    )
-    assert (found["second_best"] > found["first_best"]).any()

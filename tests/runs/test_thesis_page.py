@@ -2,7 +2,6 @@
 
 import re
 
-import pytest
 import thesis_page
 from helpers.recorded import recorded_run
 
@@ -12,7 +11,6 @@ TEXT = thesis_page.PAGE.read_text(encoding="utf-8")
 SIMULATED = read_json(thesis_page.NUMBERS, "")
 
 
-@pytest.mark.slow
 def test_the_page_is_current() -> None:
     assert thesis_page.page(recorded_run("thesis"), SIMULATED) == TEXT
 

@@ -83,14 +83,6 @@ def test_every_evaluation_is_there_and_those_that_matter_have_their_genomes(runs
     assert (tensions[walked] == 0.333333).all() and tensions.drop(walked).isna().all()
 
 
-def test_initial_populations_are_kept_where_a_page_reads_them(runs, tmp_path):
-    run, thinned = runs
-    thin(run.directory, tmp_path / "kept", initial=True)
-    others = run.initial().query("trial > 0").index
-    wholes = [one.with_parameters.index for one in (thinned, load_run(tmp_path / "kept"))]
-    assert [others.isin(whole).all() for whole in wholes] == [False, True]
-
-
 def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     run, thinned = runs
     rest = thinned.evaluations.index.difference(thinned.with_parameters.index)

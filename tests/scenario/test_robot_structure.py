@@ -34,27 +34,6 @@ def test_a_structure_has_what_its_file_says_in_si() -> None:
     assert structure_of("small", "contacts: all").blueprint().contacts.tolist() == list(range(7))
 
 
-def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
-    given = structure_of(
-        "small",
-        "{nodes: {h: [1, 1, 9]}, anchors: {h: xyz, a: xz}, loads: {g: [0 N, 0 N, -6 N]}, "
-        "contacts: all, cables: {up: {pairs: [[a, h]], stiffness: 1 N/m, damping: 0 N*s/m, "
-        "free_length: 0 m}}}",
-    )
-    blueprint = given.blueprint()
-    assert blueprint.node_names[-1] == "h"
-    assert blueprint.body_of_node[-1] == "world"
-    assert blueprint.held[-1].all()
-    assert blueprint.p_WN[-1] == pytest.approx([0.01, 0.01, 0.09])
-    assert blueprint.cable_names[0] == "up a h"
-    assert blueprint.contacts.tolist() == list(range(7)), "all but h"
-    a, g = blueprint.node_names.index("a"), blueprint.node_names.index("g")
-    assert blueprint.held[a].tolist() == [True, False, True]
-    assert blueprint.anchor_damping[a] == pytest.approx(1e-3 * blueprint.anchor_stiffness[a])
-    assert blueprint.node_load[g].tolist() == [0.0, 0.0, -6.0]
-    assert np.count_nonzero(blueprint.node_load) == 1
-
-
 def test_a_node_that_nothing_uses_is_left_out_with_a_note(tmp_path, caplog) -> None:
     file = tmp_path / "my.yaml"
     file.write_text(SMALL.replace("nodes:", "nodes:\n  spare: [1, 1, 1]", 1))

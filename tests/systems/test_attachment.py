@@ -9,14 +9,11 @@ import warnings
 import numpy as np
 import pytest
 from helpers.rod import GRAVITY, LAW, LEFT, LENGTH, MASS, RIGHT, rod_with_tendons
-from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
-from pydrake.visualization import VisualizationConfig
 from scipy.integrate import solve_ivp
 
 from tetra_drake.errors import SimulationFailure
@@ -26,11 +23,7 @@ from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.ground import make_surface
-from tetra_drake.robot.parameter_space import seeded_gait
-from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems import AddCables, AddGroundContact, Cable
-from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 def simulated(diagram: Diagram, time: float, *, accuracy: float = 1e-6) -> Simulator:
@@ -137,24 +130,6 @@ def test_the_force_of_a_cable_fades_where_its_ends_meet_and_one_without_end_is_n
         np.testing.assert_allclose(force, [60.0 * length * distance / MEETING, 0.0, 0.0])
 
 
-def test_forces_add_to_what_is_connected_to_the_plant():
-    def acceleration(moment: float) -> float:
-        """Of the level rod at rest, in rad/s²."""
-        builder, plant, _, cables = rod_with_tendons()
-        motor = builder.AddSystem(ConstantVectorSource([moment]))
-        port = plant.get_applied_generalized_force_input_port()
-        builder.Connect(motor.get_output_port(), port)
-        AddCables(builder, plant, cables=cables)
-        diagram = builder.Build()
-        derivatives = diagram.EvalTimeDerivatives(diagram.CreateDefaultContext())
-        return float(derivatives.get_generalized_velocity().CopyToVector()[0])
-
-    pull = LAW.stiffness * (LEFT + RIGHT)[2] - 0.5 * MASS * GRAVITY  # at the tip, upward
-    for moment in (0.0, 3.0):
-        expected = (moment + LENGTH * pull) / (MASS * LENGTH**2 / 3.0)
-        assert acceleration(moment) == pytest.approx(expected, rel=1e-12)
-
-
 def test_shown_pieces_cover_a_cable_of_any_length_from_end_to_end():
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
@@ -176,20 +151,3 @@ def test_shown_pieces_cover_a_cable_of_any_length_from_end_to_end():
         assert middles[0] - length / 2 == pytest.approx(0.0)
         assert middles[-1] + length / 2 == pytest.approx(height)
         assert np.diff(middles).max() <= length + 1e-12, "no gap"
-
-
-def test_a_robot_has_struts_nodes_and_cables_in_meshcat_and_in_a_scene_without_it():
-    robot, meshcat = Robot.of(load_scenario("thesis")), Meshcat()
-    gait, count = seeded_gait(robot.scenario), 5 * (6 + 4) + 24 * 4
-    assert not MakeTensegrityDiagram(robot, gait).HasSubsystemNamed("scene_graph")
-    bare = MakeTensegrityDiagram(robot, gait, scene_graph=True)
-    query = bare.GetOutputPort("query_object").Eval(bare.CreateDefaultContext())
-    assert query.inspector().num_geometries() == count
-    diagram = MakeTensegrityDiagram(robot, gait, meshcat=meshcat)
-    inspector = diagram.GetSubsystemByName("scene_graph").model_inspector()
-    assert inspector.num_geometries() == count
-    diagram.ForcedPublish(diagram.CreateDefaultContext())
-    for path in ("T1", "T1-T2 outer top 0"):
-        assert meshcat.HasPath(f"/drake/illustration/{path}")
-    can_be_dragged = hasattr(VisualizationConfig, "mouse_interaction_stiffness")
-    assert diagram.HasSubsystemNamed("meshcat_mouse_spring") == can_be_dragged

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 
-from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
@@ -73,15 +72,6 @@ def test_contexts_of_one_diagram_are_different_robots(robots):
     put(diagram, contexts[1], robots[0])
     np.testing.assert_array_equal(rates(diagram, copy), expected[1])
     np.testing.assert_array_equal(rates(diagram, contexts[1]), expected[0])
-
-
-def test_a_number_for_all_cables(robots):
-    diagram = diagram_of(robots[0], parameters=True)
-    cables = diagram.GetSubsystemByName("cables")
-    own = cables.GetMyMutableContextFromRoot(diagram.CreateDefaultContext())
-    cables.SetLaw(own, CableLaw(stiffness=100.0, damping=2.0, free_length=0.05))
-    law = cables.GetLaw(own)
-    assert [set(row) for row in law[:-1]] == [{100.0}, {2.0}, {0.05}, {1.0}, {0.0}]
 
 
 def test_tensions_have_derivatives_by_the_constants(robots):

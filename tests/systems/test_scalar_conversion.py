@@ -10,17 +10,14 @@ from helpers.springs import with_springs
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import RigidBody, SpatialInertia
 from pydrake.systems.analysis import Simulator, Simulator_
 from pydrake.systems.framework import Diagram, DiagramBuilder, System
 
-from tetra_drake.laws.actuator import Winch
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.laws.matsuoka import Network
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.systems import AddCables, AddFrame, Cable, MatsuokaCpg, Steering
+from tetra_drake.systems import AddCables, AddFrame, Cable, Steering
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 LAW = CableLaw(stiffness=40.0, damping=6.0, free_length=0.2)
@@ -82,49 +79,6 @@ def test_cables_have_the_rates_and_derivatives_of_drakes_linear_spring_dampers(s
         diagrams[0].get_input_port().FixValue(plain, numbers[4:])
         found = diagrams[0].EvalTimeDerivatives(plain).CopyToVector()
         np.testing.assert_allclose(found, rates, rtol=1e-9, atol=1e-9)
-
-
-def test_a_winch_follows_its_command_with_its_lag_in_the_derivatives_as_well():
-    # d(drive)/dt = (l0 - signal / k - drive) / lag; the tension is k (l - drive).
-    builder = DiagramBuilder()
-    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-    ball: RigidBody = plant.AddRigidBody("ball", SpatialInertia.SolidSphereWithMass(0.5, 0.1))
-    cable = Cable("rope", plant.world_frame(), ball.body_frame(), LAW._replace(damping=0.0))
-    plant.Finalize()
-    plant.SetDefaultPositions([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.5])
-    winch = Winch(max_force=1e6, max_speed=1e3, time_constant=0.05)
-    cables = AddCables(builder, plant, cables=[cable], actuated={"rope": ["rope"]}, actuation=winch)
-    builder.ExportInput(cables.GetInputPort("signals"))
-    builder.ExportOutput(cables.GetOutputPort("tensions"))
-    diagram = builder.Build()
-    start = diagram.CreateDefaultContext().get_continuous_state_vector().CopyToVector()
-    numbers = np.append(start, 3.0)
-    _, gradient = rates_and_gradient(diagram.ToAutoDiffXd(), numbers)
-    expected = np.zeros(numbers.size)
-    expected[-2:] = -1.0 / 0.05, -1.0 / (LAW.stiffness * 0.05)
-    np.testing.assert_allclose(gradient[-1], expected, atol=1e-5)
-    fall = np.zeros(numbers.size)
-    fall[[6, -2]] = -LAW.stiffness / 0.5  # the ball hangs below the world's origin
-    np.testing.assert_allclose(gradient[12], fall, atol=1e-5)
-
-
-def test_the_rates_of_oscillators_have_the_derivatives_of_their_law():
-    generator = np.random.default_rng(2)
-    weights = generator.uniform(0.0, 2.0, (6, 6))
-    network = Network.of(weights, tau_a=0.3, tau_b=0.6, self_inhibition_weight=1.1)
-    cpg = MatsuokaCpg(network, tonic=0.5, initial_state=np.zeros(12)).ToAutoDiffXd()
-    unit = np.eye(6)
-    for numbers in generator.uniform(-1.0, 1.0, (100, 18)):  # u, v, tonic input
-        _, gradient = rates_and_gradient(cpg, numbers)
-        fires = np.diag(numbers[:6] > 0.0)
-        expected = np.block(
-            [
-                [(-unit - weights @ fires) / 0.3, -1.1 * unit / 0.3, unit / 0.3],
-                [fires / 0.6, -unit / 0.6, np.zeros((6, 6))],
-            ]
-        )
-        near_a_kink = np.abs(numbers[:6]).min() < 1e-5
-        np.testing.assert_allclose(gradient, expected, atol=10.0 if near_a_kink else 1e-6)
 
 
 def doubled(turn: np.ndarray) -> np.ndarray:
