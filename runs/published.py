@@ -25,7 +25,7 @@ from script import read_settings, run_script
 import tetra_drake as td
 from tetra_drake.errors import InputError
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import write_whole
+from tetra_drake.files import read_text, write_whole
 from tetra_drake.lab.bridges.conversion import converted
 from tetra_drake.lab.bridges.formats import save_structure
 
@@ -47,7 +47,7 @@ class Motion:
 def readable(model: Path) -> str:
     """Text of the model without settings that MuJoCo no longer knows. All its bodies are at the
     origin, where global coordinates are local ones."""
-    text = model.read_text()
+    text = read_text(model, "model")
     for old in (' coordinate="global"', 'sensornoise="disable"'):
         text = text.replace(old, "")
     return text
@@ -122,10 +122,8 @@ def compared(by_name: dict[str, Motion]) -> dict[str, Any]:
     return rows
 
 
-def motions(model: Path, start: Any, settings: Any) -> dict[str, Motion]:
-    """Motions from a start, by name."""
-    structure = model.with_suffix(".yaml")
-    save_structure(converted(model), structure, source=model.name)
+def motions(model: Path, structure: Path, start: Any, settings: Any) -> dict[str, Motion]:
+    """Motions from a start, by name: of the model in MuJoCo, of the converted structure here."""
     by_name = {
         "MuJoCo": by_mujoco(model, start, step=1e-3, pull_only=False),
         "MuJoCo, cables": by_mujoco(model, start, step=1e-4, pull_only=True),
@@ -157,10 +155,12 @@ def main(arguments: Sequence[str]) -> None:
     settings, model = read_settings(OUT / "settings.yaml"), Path(arguments[0])
     motions_of = {}
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(shutil.copytree(model.parent, folder, dirs_exist_ok=True)) / model.name
+        copy, structure = Path(folder) / model.name, Path(folder) / "converted.yaml"
         write_whole(copy, readable(model))
+        shutil.copytree(model.parent / "common", copy.parent / "common")
+        save_structure(converted(copy), structure, source=model.name)
         for name, start in settings["starts"].items():
-            motions_of[name] = motions(copy, start, settings)
+            motions_of[name] = motions(copy, structure, start, settings)
     save_figure(figure(motions_of), OUT, "paths", kinds=["svg"])
     numbers = {start: compared(by_name) for start, by_name in motions_of.items()}
     write_whole(OUT / "numbers.json", json.dumps(numbers, indent=1))

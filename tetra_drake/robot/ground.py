@@ -98,16 +98,14 @@ def make_surface(
         grid = terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
     source = origin(terrain_kind)
     check_type(source, "grid", grid, Grid)
-    shapes = {"heights": np.shape(grid.heights), "corner": (2,), "cell": (2,)}
-    heights, _, cell = (
-        checked_numbers(
-            value, shapes[name], source=source, key=f"grid.{name}", finite=name != "heights"
-        )
-        for name, value in vars(grid).items()
-    )
-    if fault := fault_of_heights(heights) or (
-        "" if cell.min() > 0.0 else f"cells of {grid.cell} m"
-    ):
+    shape = np.shape(grid.heights)
+    heights = checked_numbers(grid.heights, shape, source=source, key="grid.heights")
+    checked_numbers(grid.corner, (2,), source=source, key="grid.corner", finite=True)
+    cell = checked_numbers(grid.cell, (2,), source=source, key="grid.cell", finite=True)
+    fault = fault_of_heights(heights)
+    if not fault and cell.min() <= 0.0:
+        fault = f"cells of {grid.cell} m"
+    if fault:
         raise InputError(source, "grid", f"has {fault}")
     is_stepped = terrain_kind.is_stepped
     surface_grid = terrain.SurfaceGrid.of(grid.heights, grid.corner, grid.cell, is_stepped)

@@ -73,8 +73,8 @@ class PolicyKind(Section):
 
     def gait_parameters(self, blueprint: Blueprint) -> Mapping[str, GaitParameter]:
         """The same as parameters of a gait."""
-        found, source = {}, origin(self)
-        check_type(source, "parameters", given := self.parameters(blueprint), Mapping)
+        found, source, given = {}, origin(self), self.parameters(blueprint)
+        check_type(source, "parameters", given, Mapping)
         for key, pair in given.items():
             low, high = checked_numbers(pair, (2,), source=source, key=str(key)).tolist()
             if not -math.inf < low <= high < math.inf:
