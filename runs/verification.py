@@ -117,8 +117,8 @@ def followed(problem: Mapping[str, Any], result: SimulationResult) -> Array:
 
 
 def run(problem: Mapping[str, Any], engine: str, *, drift: bool = False) -> dict[str, Any]:
-    """What an engine finds: curves `x`, `found` and `expected`, their `size`, the greatest error as a
-    share of it, drift of energy (J), and wall time `s` (s)."""
+    """What an engine finds: curves `x`, `found` and `expected`, their `size`, the greatest error as
+    a share of it, drift of energy (J), and wall time `s` (s)."""
     x, found, expected, drifts = (list[float]() for _ in range(4))
     wall = 0.0
     cases = problem.get("cases", [{}])
