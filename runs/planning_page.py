@@ -168,12 +168,7 @@ def write_page(folder: Path, episodes: Sequence[Any]) -> None:
     goals = {name: records for name, records in groups.items() if name.startswith("goals")}
     save_figure(goals_figure(goals), folder, "goals", kinds=["svg"])
     save_figure(courses_figure(groups["courses"]), folder, "courses", kinds=["svg"])
-    plants, period = EPISODES["engines"], EPISODES["planner"]["decision_period"]
-    found = partial(speeds, groups["speeds"])
-    level = {
-        ground: {plant: found(f"{ground}, {plant}, seed") for plant in plants}
-        for ground in EPISODES["grounds"]
-    }
+    period = EPISODES["planner"]["decision_period"]
     cpu = {name: [each["cpu"] for each in of] for name, of in groups.items() if of}
     walls = [record["wall"] for record in groups["real time"]]
     of_goals = itertools.chain(*(times for name in goals for times in cpu.get(name, [])))
@@ -186,9 +181,7 @@ def write_page(folder: Path, episodes: Sequence[Any]) -> None:
         goals=goals,
         costs={name: costs(times, CORES * period) for name, times in cpu.items()},
         walls=costs(walls, period) if walls else None,
-        level=level,
-        medians=[[middle for middle, *_ in each.values()] for each in level.values()],
-        found=found,
+        found=partial(speeds, groups["speeds"]),
         others={record["name"]: record for record in groups["others"]},
         film=FILM,
         evolved=load_times(HERE.parent)["rolling"]["evolution"]["cores_s"],

@@ -23,7 +23,7 @@ from analyse import DRAWN, MUJOCO, SPEED, TIGHT, TURNED, Analysis, load_analysis
 from page import rendered
 from parting import partings
 from PIL import Image
-from readings import RECORD, load_record
+from readings import load_tables
 from record import EXPERIMENTS, PICTURE
 from script import run_script
 from settle import settled
@@ -200,9 +200,9 @@ def trust_table(runs: Runs) -> str:
 
 def results_table(runs: Runs) -> str:
     """Table of the thesis's results and ours, for README.md."""
-    names, record = {"thesis": "thesis", "thesis-listing": "listing"}, load_record(RECORD)
+    names, tables = {"thesis": "thesis", "thesis-listing": "listing"}, load_tables()
     best = [best_gait(name, runs[name]) for name in names]
-    trials = [pandas.DataFrame(record[reading]) for reading in names.values()]
+    trials = [tables[reading] for reading in names.values()]
     return rendered("results.md", names=[*names], best=best, trials=trials)
 
 

@@ -217,7 +217,7 @@ def simulated_numbers(run: Run) -> dict[str, Any]:
 def page(run: Run, simulated: Mapping[str, Any]) -> str:
     """Text of the page, with simulated_numbers()."""
     sines = load_sines()
-    tables = readings.tables_of(readings.load_record(readings.RECORD))
+    tables = readings.load_tables()
     return rendered(
         "thesis.md",
         ours=trials_numbers(run),
