@@ -187,34 +187,19 @@ def curves(result: Mapping[str, Any]) -> str:
     values = np.concatenate([*map(np.asarray, lines.values())])
     low, size = values.min(), np.ptp(values) or 1.0
     across = 4.0 + 152.0 * (x - x.min()) / (np.ptp(x) or 1.0)
-    shapes = []
+    points = {}
     for colour, line in lines.items():
         up = 56.0 - 52.0 * (np.asarray(line) - low) / size
-        points = " ".join(f"{a:.0f},{b:.1f}" for a, b in zip(across, up, strict=True))
-        width = 4 if colour == "#bbb" else 1
-        if len(x) > 20:
-            shapes.append(f'<polyline points="{points}" stroke="{colour}" stroke-width="{width}"/>')
-            continue
-        dots = "".join(f"M{point}h0" for point in points.split())
-        shapes.append(f'<path d="{dots}" stroke="{colour}" stroke-width="{2 * width + 2}"/>')
-    box = 'viewBox="0 0 160 60" width="160" height="60" fill="none" stroke-linecap="round"'
-    return f'<svg xmlns="http://www.w3.org/2000/svg" {box}>{"".join(shapes)}</svg>\n'
+        points[colour] = [f"{a:.0f},{b:.1f}" for a, b in zip(across, up, strict=True)]
+    return rendered("curves.svg", lines=points)
 
 
 def write_page(results: Mapping[str, Any]) -> None:
     """Writes the page from the results by problem."""
-    seconds = sum(
-        x.get("s", 0.0) + x.get("fine_s", 0.0)
-        for r in results.values()
-        for x in r["engines"].values()
-    )
-    text = rendered(
-        "verification.md",
-        problems=PROBLEMS,
-        results=results,
-        engines=[*ENGINES],
-        minutes=seconds / 60.0,
-    )
+    engines = [each for result in results.values() for each in result["engines"].values()]
+    seconds = sum(each.get("s", 0.0) + each.get("fine_s", 0.0) for each in engines)
+    numbers = {"results": results, "engines": [*ENGINES], "minutes": seconds / 60.0}
+    text = rendered("verification.md", problems=PROBLEMS, **numbers)
     write_whole(HERE / "README.md", text)
 
 
