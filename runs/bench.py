@@ -324,27 +324,24 @@ def scores_figure(records: Sequence[Record]) -> Figure:
 def numbers(records: Sequence[Record]) -> dict[str, Any]:
     """Numbers of the page: of each entry over all tasks, and interquartile means with their
     intervals and the best solution by task."""
-    found, of_entries = scores(records), shares(records)
+    table, of_entries = pandas.DataFrame(records), shares(records)
     entries: dict[str, Any] = {}
     for name in entry_names(records):
-        own = [one for one in records if one["entry"] == name]
-        seconds = [one for one in own if one.get("second") and one["score"] > 0]
-        kept = [one["second"] / one["score"] for one in seconds]
+        own = table[table["entry"] == name]
+        kept = own["second"] / own["score"].where((own["score"] > 0.0) & (own["second"] != 0.0))
         entries[name] = {
-            "about": own[0]["about"],
+            "about": own["about"].iloc[0],
             "tasks": len(of_entries[name]),
             "share": overall(of_entries[name]),
-            "kept": np.median(kept or [math.nan]),
-            "time": np.median([one["wall_s"] for one in own]),
+            "kept": kept.median(),
+            "time": own["wall_s"].median(),
         }
     means: dict[str, dict[str, tuple[float, ...]]] = {}
-    for (task, name), each in found.items():
+    for (task, name), each in scores(records).items():
         mean = float(interquartile_mean(each))
         means.setdefault(task, {})[name] = (mean, *interval(each, interquartile_mean))
     highest = {task: max(of_task, key=of_task.__getitem__) for task, of_task in means.items()}
-    best: dict[str, Record] = {}
-    for one in records:
-        best[one["task"]] = max(best.get(one["task"], one), one, key=lambda each: each["score"])
+    best = table.loc[table.groupby("task")["score"].idxmax()].set_index("task").to_dict("index")
     return {"entries": entries, "means": means, "highest": highest, "best": best}
 
 
