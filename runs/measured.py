@@ -238,17 +238,14 @@ def table(rows: pandas.DataFrame) -> str:
 
 def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> str:
     """Text of the page from of_simulations() and measured_rows()."""
-    blind, kinds = rows["blind"], ["structure", "kind"]
-    blindest = blind[blind["structure"].isin(BLINDEST)]
     return rendered(
         "measured.md",
         **simulated,
         measured_rises=[*JUMPS.values()],
-        rows={name: each.to_dict("records") for name, each in rows.items()},
-        by={column: totals(rows["known"], column) for column in kinds},
-        blind={key: Score.of(each) for key, each in blind.groupby(kinds, sort=False)},
-        anew={key: Score.of(each) for key, each in rows["anew"].groupby(kinds)},
-        blindest={"the three blindest": Score.of(blindest), "all": Score.of(blind)},
+        rows=rows,
+        totals_of=totals,
+        score_of=Score.of,
+        blindest=BLINDEST,
         hash=hashlib.sha256((HERE / "blind.csv").read_bytes()).hexdigest(),
         interval_text=interval_text,
         shortened=shortened,
