@@ -232,21 +232,16 @@ def pages(runs: Runs) -> list[Path]:
 
 def made_again(page: Path, runs: Runs) -> str:
     """Text of a page with new tables. Raises InputError if the page cannot be read."""
-
     name = page.parent.name
-
-    def make_table(table: str) -> str:
-        tables = {
-            "results": lambda: results_table(runs),
-            "gallery": lambda: gallery_table(runs),
-            "trust": lambda: trust_table(runs),
-            "trials": lambda: trials_table(name, runs),
-            "settled": lambda: settled(HERE / OTHERS[name], HERE / name).markdown(),
-            "partings": lambda: partings_table(name, "thesis"),
-        }
-        return tables[table]()
-
-    return filled(read_text(page, "page"), make_table)
+    tables = {
+        "results": lambda: results_table(runs),
+        "gallery": lambda: gallery_table(runs),
+        "trust": lambda: trust_table(runs),
+        "trials": lambda: trials_table(name, runs),
+        "settled": lambda: settled(HERE / OTHERS[name], HERE / name).markdown(),
+        "partings": lambda: partings_table(name, "thesis"),
+    }
+    return filled(read_text(page, "page"), lambda table: tables[table]())
 
 
 def filled(text: str, make_table: Callable[[str], str]) -> str:

@@ -101,8 +101,7 @@ def followed(problem: Mapping[str, Any], result: SimulationResult) -> Array:
 def run(problem: Mapping[str, Any], engine: str, *, drift: bool = False) -> dict[str, Any]:
     """What an engine finds: curves `x`, `found` and `expected`, their `size`, the greatest error as
     a share of it, drift of energy (J), and wall time `s` (s)."""
-    x, found, expected, drifts = (list[float]() for _ in range(4))
-    wall = 0.0
+    parts, drifts, wall = [], [], 0.0
     cases = problem.get("cases", [{}])
     for number, case in enumerate(cases):
         bristles = "0 N/m" if engine.startswith("!Mujoco") else "30 kN/m"
@@ -122,10 +121,11 @@ def run(problem: Mapping[str, Any], engine: str, *, drift: bool = False) -> dict
             drifts.append(float(np.abs(energy - energy[0]).max()))
         if len(cases) > 1:
             times, values, right = np.array([number]), values[-1:], right[-1:]
-        x, found, expected = [*x, *times], [*found, *values], [*expected, *right]
+        parts.append([times, values, right])
+    x, found, expected = (np.concatenate(part) for part in zip(*parts, strict=True))
     size = float(np.ptp(expected)) or 1.0
-    error = float(np.abs(np.subtract(found, expected)).max() / size)
-    curves = {"x": np.array(x), "found": np.array(found), "expected": np.array(expected)}
+    error = float(np.abs(found - expected).max() / size)
+    curves = {"x": x, "found": found, "expected": expected}
     return curves | {"size": size, "error": error, "drift": max(drifts, default=None), "s": wall}
 
 
