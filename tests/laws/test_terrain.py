@@ -126,26 +126,6 @@ def rolled(terrain: Relief, radius: float) -> tuple[SurfaceGrid, np.ndarray]:
     return rolled_surface(base, grid.heights, radius)
 
 
-STAIRS = Steps(height=0.02, depth=0.08, count=20, start=0.0)
-
-
-@pytest.mark.parametrize("terrain", [STAIRS, Rough(amplitude=0.01, wavelength=0.06)])
-@pytest.mark.parametrize("radius", [0.005, 0.05])
-def test_the_normal_of_a_foot_is_the_gradient_of_its_depth(terrain, radius):
-    # So k depth is the force of an energy k depth^2 / 2, at corners and edges, too.
-    surface_and_heights, generator, h = rolled(terrain, radius), np.random.default_rng(2), 1e-6
-    for x, y, share in generator.uniform([-0.2, -0.2, 0.01], [0.5, 0.2, 0.4], (12, 3)):
-        top, _, _ = surface(x, y, *surface_and_heights)
-        centre = np.array([x, y, top - share * radius])
-        frame = frame_under(centre, surface_and_heights)
-        gaps = [
-            [frame_under(centre + side * axis, surface_and_heights)[GAP] for side in (h, -h)]
-            for axis in np.eye(3)
-        ]
-        gradient = -np.diff(gaps, axis=1)[:, 0] / (2.0 * h)
-        np.testing.assert_allclose(frame[N_X : N_X + 3], gradient, atol=1e-3)
-
-
 @pytest.mark.parametrize("radius", [0.005, 0.02])
 def test_the_gap_of_a_foot_is_its_distance_to_the_nearest_point(ground, radius):
     terrain = Rough(amplitude=0.01, wavelength=0.15, seed=3)
