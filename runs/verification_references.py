@@ -151,7 +151,8 @@ def throw(times: Array, case: Case) -> Array:
     return height - 1.0 + projectile(times, case)
 
 
-def double_pendulum(times: Array, case: Case) -> Array:
+def double_angles(start: Sequence[float], times: Array) -> Array:
+    """Angles (2, times) from the vertical of two bars that are let go at angles (rad)."""
     lengths, radius = np.array([0.4, 0.3]), 0.004
     m, n = masses = 1200.0 * math.pi * radius**2 * lengths
     i, j = masses * (lengths**2 / 12.0 + radius**2 / 4.0)
@@ -167,7 +168,11 @@ def double_pendulum(times: Array, case: Case) -> Array:
         ]
         return np.append(y[2:], np.linalg.solve(inertia, force))
 
-    a, b = solved(rate, [math.pi / 2, math.pi / 2, 0.0, 0.0], times)[:2]
+    return solved(rate, [*start, 0.0, 0.0], times)[:2]
+
+
+def double_pendulum(times: Array, case: Case) -> Array:
+    a, b = double_angles([math.pi / 2, math.pi / 2], times)
     return 0.4 * np.sin(a) + 0.3 * np.sin(b)
 
 

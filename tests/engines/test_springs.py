@@ -132,17 +132,6 @@ def test_masses_that_a_damped_string_stops_from_parting_go_on_together():
     np.testing.assert_allclose(v[:, 0], 0.25, atol=5e-3)
 
 
-def test_of_coils_in_a_row_only_those_stretch_whose_initial_tension_is_borne():
-    groups = {
-        "soft": COIL | {"initial_tension": 1.0, "pairs": [["h", "m"]]},
-        "firm": COIL | {"initial_tension": 5.0, "pairs": [["m", "n"]]},
-    }
-    row = {"h": [0.0, 0.0, 1.0], "m": [0.0, 0.0, 0.9], "n": [0.0, 0.0, 0.8]}
-    length, tension, _ = ended(groups, row, "h", {"m": 0.01, "n": 0.3})
-    np.testing.assert_allclose(tension, [0.31 * G, 0.3 * G], rtol=1e-3)
-    np.testing.assert_allclose(length - FREE, [(0.31 * G - 1.0) / 200.0, 0.3 * G / 2e5], atol=1e-5)
-
-
 def test_a_coil_that_bears_less_than_its_initial_tension_swings_as_a_rod():
     groups = {"coil": COIL | {"initial_tension": 9.0, "damping": 0.0, "pairs": [["h", "m"]]}}
     aside = {"h": [0.0, 0.0, 1.0], "m": [FREE * np.sin(0.5), 0.0, 1.0 - FREE * np.cos(0.5)]}

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from verification_references import double_angles
 
 from helpers.anchored import TREES, scenario_of, supported_prism
 from tetra_drake.robot.robot import Robot
@@ -102,25 +103,7 @@ def folded(duration: float = 0.4) -> Robot:
 
 def as_a_double_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
     """Lagrange's equations of two bars, for their angles from the vertical."""
-    m, n = robot.structure.mass
-    i, j = robot.structure.mass * robot.structure.unit_inertia[:, 0]
-
-    def rate(_: float, y: np.ndarray) -> np.ndarray:
-        a, b, a_rate, b_rate = y
-        across = 0.5 * n * UPPER * LOWER
-        mixed, bent = across * np.cos(a - b), across * np.sin(a - b)
-        inertia = [
-            [i + 0.25 * m * UPPER**2 + n * UPPER**2, mixed],
-            [mixed, j + 0.25 * n * LOWER**2],
-        ]
-        force = [
-            -bent * b_rate**2 - (0.5 * m + n) * G * UPPER * np.sin(a),
-            bent * a_rate**2 - 0.5 * n * G * LOWER * np.sin(b),
-        ]
-        return np.concatenate([y[2:], np.linalg.solve(inertia, force)])
-
-    start, span = [*LEANS, 0.0, 0.0], (0.0, times[-1])
-    upper, lower = solve_ivp(rate, span, start, t_eval=times, **EXACT).y[:2]
+    upper, lower = double_angles(LEANS, times)
     knee = UPPER * along(upper)
     return np.stack([0.0 * knee, knee, knee, knee + LOWER * along(lower)], axis=1)
 
