@@ -105,10 +105,8 @@ def test_a_winch_pulls_through_a_ring_against_its_friction(pull):
 def test_each_swing_of_a_pendulum_loses_the_work_of_dry_friction(engine):
     hinged, torque = TREES["hinged"], 4e-4
     joints = {name: joint | {"friction": torque} for name, joint in hinged["joints"].items()}
-    tree = hinged | {"joints": joints}
-    robot = Robot.of(scenario_of(tree, 3.0, engine=engine, **{"simulation.sample_period": "2 ms"}))
-    pivot = np.tile([0.0, 0.0, 1.0], (2, 1))
-    robot = joined.turned(robot, {1: joined.LEANS[0]}, {1: pivot})
+    changes = {"engine": engine, "simulation.sample_period": "2 ms"}
+    robot = joined.ajar(hinged | {"joints": joints}, 3.0, **changes)
     found, structure = motion_of(robot), robot.structure
     x, _, z = (found.p_WN.sel(node="e").values - [0.0, 0.0, 1.0]).T
     angle = np.arctan2(-x, -z)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from helpers.anchored import TREES, scenario_of
 from helpers.joined import swing
-from pydrake.systems.framework import Context
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
@@ -107,16 +106,13 @@ def test_a_spin_moves_all_bodies_about_the_robots_centre_and_turns_with_the_incl
     assert np.abs(sloping.structure.v_WB[:, 3:] @ up).max() < 1e-14
 
 
-def velocities(diagram_context: Context) -> np.ndarray:
-    return diagram_context.get_continuous_state().get_generalized_velocity().CopyToVector()
-
-
 def test_the_diagrams_default_context_and_its_simulator_have_the_velocities_of_the_start():
     robot = Robot.of(scenario_of(BALLS | {"start": THROWN}, engine="!Drake"))
     diagram = MakeTensegrityDiagram(robot)
     simulator = MakeSimulator(diagram, robot, Drake())
     for context in (diagram.CreateDefaultContext(), simulator.get_context()):
-        np.testing.assert_array_equal(velocities(context), [0.0, 0.0, 0.0, 3.0, 0.0, 4.0] * 2)
+        found = context.get_continuous_state().get_generalized_velocity().CopyToVector()
+        np.testing.assert_array_equal(found, [0.0, 0.0, 0.0, 3.0, 0.0, 4.0] * 2)
 
 
 def test_draws_vary_velocities_and_pushes():

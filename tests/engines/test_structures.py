@@ -10,7 +10,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers.anchored import BAR, TREES, floating_prism, scenario_of
+from helpers.anchored import BAR, floating_prism
 from helpers.kernels import Stepper
 from helpers.structures import (
     driven_as_recorded,
@@ -149,19 +149,6 @@ def test_a_robot_that_nothing_drives_falls_and_rests(engine, name, changes, sign
     np.testing.assert_allclose(end.p_WN.sel(axis="z"), heights, atol=1e-5)
     assert float(end.normal_force.sum()) == pytest.approx(robot.weight, rel=1e-3)
     assert result.metrics.actuator_work == result.metrics.signal_rate == 0.0
-
-
-def test_parallel_cables_add_and_a_load_needs_no_strut(engine):
-    changes = {"engine": engine, "friction.stiffness": "0 N/m"}
-    scenario = scenario_of(TREES["two_ropes"]).with_changes(BRIEF | changes)
-    g, robot = scenario.robot.gravity, Robot.of(scenario)
-    assert robot.equilibrium.lengths == pytest.approx([0.98 + g / 1000.0] * 2)
-    trajectory = simulate(scenario, seeded_gait(scenario), record=True).trajectory
-    rise = 0.005 * np.cos(np.sqrt(1000.0) * trajectory.time.values)
-    heights = 2.0 - 0.98 - g / 1000.0 + rise
-    np.testing.assert_allclose(trajectory.p_WB[:, 0, 2], heights, atol=5e-5)
-    tension = g - 1000.0 * rise[:, np.newaxis] * [1.0, 1.0]
-    np.testing.assert_allclose(trajectory.tension / [0.6, 0.4], tension, atol=0.05)
 
 
 def test_what_a_structure_lacks_is_null_in_its_result(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -108,9 +109,9 @@ def as_a_double_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
     return np.stack([0.0 * knee, knee, knee, knee + LOWER * along(lower)], axis=1)
 
 
-def ajar() -> Robot:
+def ajar(tree: dict[str, Any] = HINGED, duration: float = 0.5, **changes: object) -> Robot:
     """The triangle on its hinge, turned by 0.5 rad."""
-    robot = Robot.of(scenario_of(HINGED, duration=0.5))
+    robot = Robot.of(scenario_of(tree, duration, **changes))
     return turned(robot, {1: LEANS[0]}, {1: np.tile([0.0, 0.0, 1.0], (2, 1))})
 
 

@@ -1,7 +1,6 @@
 """Arguments that are packed once for all calls of a kernel. All kernels show that they arrive."""
 
 import numpy as np
-import pytest
 
 from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
@@ -17,9 +16,3 @@ def test_robots_of_any_size_share_machine_code(scenario):
         given = parts, robot.structure.initial_state, np.empty(6 * count)
         codes.add(machine_code(compute_state_forces, *given))
     assert len(codes) == 1
-
-
-@pytest.mark.parametrize("array", [np.zeros((2, 4))[:, ::2], np.zeros(2, dtype=np.float32)])
-def test_an_array_that_kernels_would_misread_is_refused(array):
-    with pytest.raises(ValueError, match="no field"):
-        Packed((array,))
