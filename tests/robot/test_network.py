@@ -1,12 +1,11 @@
 """The network of a gait: who inhibits whom, what steering and feedback are made of."""
 
 import numpy as np
+from helpers.actuations import SIDES
 
 from tetra_drake.laws.matsuoka import connections
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
-
-SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 
 
 def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):

@@ -21,10 +21,9 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 
-def forces_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Forces, np.ndarray]:
-    """All forces without actuation, and as forces on the bodies."""
-    stepper = Stepper(robot)
-    return stepper.forces, stepper.force_at(state, modes, np.zeros(1 + robot.cables.signal.max()))
+def force_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> np.ndarray:
+    """Force on the bodies (6 n,) without actuation."""
+    return Stepper(robot).force_at(state, modes, np.zeros(1 + robot.cables.signal.max()))
 
 
 def damping_and_stiffness(
@@ -87,7 +86,7 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(name, terrain, fric
     state[poses:] = 0.0
 
     def force_at(velocity: np.ndarray) -> np.ndarray:
-        return forces_of(robot, np.append(state[:poses], velocity), modes)[1]
+        return force_of(robot, np.append(state[:poses], velocity), modes)
 
     changes = 1e-4 * np.eye(len(state) - poses)
     jacobian = np.array([force_at(v) - force_at(-v) for v in changes]).T / 2e-4
@@ -105,7 +104,7 @@ def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
     def forces_moved(motion: np.ndarray) -> np.ndarray:
         moved = state.copy()
         move_bodies(state, motion, 1.0, moved)
-        return forces_of(robot, moved, modes)[1]
+        return force_of(robot, moved, modes)
 
     columns = [forces_moved(m) - forces_moved(-m) for m in 1e-7 * np.eye(30)]
     jacobian = np.array(columns).T / 2e-7
