@@ -16,6 +16,7 @@ from helpers.states import energy_and_momenta
 from helpers.structures import (
     driven_as_recorded,
     end_on_diagram,
+    motion_of,
     poses_of,
     simulated,
     thrown,
@@ -29,13 +30,11 @@ from pydrake.systems.framework import DiagramBuilder
 from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.drake import MakeSimulator
-from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces, compute_state_forces
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
@@ -53,8 +52,7 @@ def trajectory_of(robot: Robot, engine: str):
     """The trajectory of a robot from its start, on an engine, accurate if it has no settings."""
     changes = {"engine": ACCURATE.get(engine, engine), "friction.stiffness": "0 N/m"}
     robot = dataclasses.replace(robot, scenario=robot.scenario.with_changes(changes))
-    walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, 3))
-    return engine_of(robot.scenario).simulate(walk, record=True).trajectory
+    return motion_of(robot, seed=3)
 
 
 def on_a_spring(robot: Robot, times: np.ndarray) -> np.ndarray:
