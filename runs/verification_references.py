@@ -320,7 +320,8 @@ def rope_modes() -> tuple[Array, Array, Array]:
 
 
 def rings() -> tuple[Array, Array, Array]:
-    tau, fatigue, beta, found = 0.1, 0.6, 2.5, []
+    tau, fatigue, beta = 0.1, 0.6, 2.5
+    found, expected = list[float](), list[float]()
     for count, weight in ((2, 1.0 + tau / fatigue), (3, 2.5), (5, 2.5)):
         weights = np.zeros((count + count % 2,) * 2)
         for i in range(count):
@@ -335,8 +336,15 @@ def rings() -> tuple[Array, Array, Array]:
             simulator.AdvanceTo(time)
             states.append(simulator.get_context().get_continuous_state_vector().CopyToVector()[0])
         found.append(period(times, np.array(states)))
-    pair = 2.0 * math.pi * math.sqrt(tau * fatigue / (beta - tau / fatigue))
-    return np.array([2, 3, 5]), np.array(found), np.array([pair, 0.3271, 0.6405])
+
+        def rate(_: float, y: Array, weights: Array = weights) -> Array:
+            u, v = y.reshape(2, -1)
+            y = np.maximum(u, 0.0)
+            return np.append((1.0 - u - beta * v - weights @ y) / tau, (y - v) / fatigue)
+
+        expected.append(period(times, solved(rate, start, times, max_step=1e-2)[0]))
+    expected[0] = 2.0 * math.pi * math.sqrt(tau * fatigue / (beta - tau / fatigue))
+    return np.array([2, 3, 5]), np.array(found), np.array(expected)
 
 
 def period(times: Array, values: Array) -> float:
