@@ -27,7 +27,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
-from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
@@ -91,9 +90,7 @@ def leaning() -> Robot:
 def as_a_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
     structure, lever = robot.structure, np.linalg.norm(robot.structure.p_BN[0])
     square = G * lever / (structure.unit_inertia[0, 0] + lever**2)
-    exact = {"t_eval": times, "rtol": 1e-10, "atol": 1e-12}
-    start, span = [ANGLE, 0.0], (0.0, times[-1])
-    angle = solve_ivp(lambda _, y: [y[1], -square * np.sin(y[0])], span, start, **exact).y[0]
+    angle = joined.swing(square, times, angle=ANGLE)
     place = 0.4 * np.stack([-np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=1)
     return np.stack([0.0 * place, place], axis=1)
 
