@@ -80,11 +80,7 @@ CROSSING += [((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))]
 def leaning() -> Robot:
     """A bar whose upper end is held, turned about it."""
     robot = Robot.of(scenario_of(SWINGING, duration=0.6))
-    c, s = np.cos(ANGLE), np.sin(ANGLE)
-    p_WB = robot.structure.p_WB @ [[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]
-    q_WB = np.array([[np.cos(0.5 * ANGLE), 0.0, np.sin(0.5 * ANGLE), 0.0]])
-    turned = dataclasses.replace(robot.structure, p_WB=p_WB, q_WB=q_WB)
-    return dataclasses.replace(robot, structure=turned)
+    return joined.turned(robot, {0: ANGLE}, {0: np.zeros((2, 3))})
 
 
 def as_a_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray
 from helpers.converged import shortly
+from helpers.outcomes import assert_same
 
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.mjcf import loose_remark
@@ -91,11 +92,7 @@ def test_many_gaits_walk_or_fail_as_each_alone(short, monkeypatch):
     for workers in (1, 2):
         many = simulate_many(scenario=short, gaits=gaits, record=True, workers=workers)
         for found, expected in zip(many, alone, strict=True):
-            if isinstance(expected, Diverged):
-                assert (found.time, found.reason) == (expected.time, expected.reason)
-            else:
-                assert (found.metrics, found.integrator) == (expected.metrics, expected.integrator)
-                xarray.testing.assert_identical(found.trajectory, expected.trajectory)
+            assert_same(found, expected)
 
 
 def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure):

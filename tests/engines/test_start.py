@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 from helpers.anchored import TREES, scenario_of
-from helpers.converged import CONVERGED
 from helpers.joined import swing
 from pydrake.systems.framework import Context
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.laws.terrain import Flat, Incline
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.parameter_space import seeded_gait
@@ -131,21 +129,6 @@ def test_draws_vary_velocities_and_pushes():
     ratios = drawn.robot.start.velocity[2] / 2.0, drawn.events[0].push.impulse[2] / 0.02
     assert all(0.5 <= ratio <= 1.5 and ratio != 1.0 for ratio in ratios)
     assert ratios[0] != ratios[1]
-
-
-def test_a_push_acts_once_also_on_a_robot_that_is_damaged_and_restored_afterwards():
-    changes = {"events": [PUSH], "engine": CONVERGED["compiled"]}
-    changes["simulation.control_period"] = "0.1 s"
-    simulation = Simulation(scenario_of(BALLS | PUSHED, 0.4, **changes))
-    for _ in range(2):
-        simulation.step(simulation.rest)
-    simulation.damage(0, cables=["cord a b"])
-    saved = simulation.save()
-    simulation.step(simulation.rest)
-    simulation.restore(saved)
-    readings = simulation.step(simulation.rest)
-    np.testing.assert_allclose(readings.v_WN[0, 1], [0.0, 0.0, 0.2], atol=1e-9)
-    np.testing.assert_allclose(readings.p_WN[0, 1, 2], 1.0 + 0.2 * 0.2, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["held_rod", "joined_rod"])
