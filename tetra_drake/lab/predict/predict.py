@@ -47,7 +47,7 @@ from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.remarks import yielding_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import stream
-from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario, save_scenario
+from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.quantities import Quantity
@@ -404,9 +404,9 @@ def shares_of(
     return {key: part / sum(parts.values()) for key, part in parts.items()}
 
 
-def save_predictions(predictions: Predictions, folder: Path) -> list[str]:
-    """Writes the scenario, tables, the figure, and a page in Markdown and HTML to a folder. Returns
-    the names of the files. Raises InputError if one cannot be written."""
+def save_predictions(predictions: Predictions, folder: Path) -> None:
+    """Writes the scenario, tables, the figure, and a page in Markdown and HTML to a folder. Raises
+    InputError if a file cannot be written."""
     save_scenario(folder, predictions.scenario)
     tables = {
         "predictions": predictions.quantities.reset_index(names="quantity"),
@@ -423,8 +423,8 @@ def save_predictions(predictions: Predictions, folder: Path) -> list[str]:
         "wall_time_s": predictions.wall_time,
     }
     figure = predictions_figure(predictions)
-    written = save_findings(figure, folder, FIGURE, tables=tables, summary=summary)
-    pages = write_page(
+    save_findings(figure, folder, FIGURE, tables=tables, summary=summary)
+    write_page(
         folder,
         PAGE,
         title=f"Predictions of {predictions.scenario.name}",
@@ -436,7 +436,6 @@ def save_predictions(predictions: Predictions, folder: Path) -> list[str]:
         second=predictions.table_of_shares,
         content="has the numbers and their tolerances",
     )
-    return [*pages, SCENARIO, *written]
 
 
 @figure_function
