@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from helpers.anchored import BAR, TREES, scenario_of, supported_prism
+from helpers.anchored import TREES, scenario_of, supported_prism
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.scenario import Scenario
 
 G = 9.80665
@@ -24,20 +25,7 @@ ATWOOD, STRING, DOUBLE, HINGED, RHOMBUS = (
 def with_arm(**changes: object) -> Scenario:
     """The shipped prism on supports, with an arm on a ball joint and a driven cable over a ring at
     the arm's end."""
-    prism = supported_prism().robot.model_dump()
-    shoulder = prism["nodes"]["n3"]
-    hand = [shoulder[0] + 0.06, shoulder[1] + 0.02, shoulder[2] + 0.05]
-    arm = BAR | {"pairs": [["s", "h"]]}
-    rope = {"pairs": [["n0", "h", "n4"]], "stiffness": 200.0, "damping": 1.0, "tension": 4.0}
-    tree = prism | {
-        "nodes": prism["nodes"] | {"s": shoulder, "h": hand},
-        "struts": prism["struts"] | {"arm": arm},
-        "cables": prism["cables"] | {"rope": rope},
-        "joints": {"shoulder": {"nodes": ["n3", "s"]}},
-        "bodies": {"arm": {"struts": ["arm"], "mass": 0.03, "inertia": [4e-5, 3e-5, 2e-5]}},
-        "actuated": prism["actuated"] | {"rope": ["rope n4 h n0"]},
-    }
-    return scenario_of(tree, **changes)
+    return scenario_of(merged(supported_prism().robot.model_dump(), TREES["arm"]), **changes)
 
 
 def released() -> Robot:
@@ -143,16 +131,22 @@ def ajar() -> Robot:
     return turned(robot, {1: LEANS[0]}, {1: np.tile([0.0, 0.0, 1.0], (2, 1))})
 
 
+def swing(square: float, times: np.ndarray, *, angle: float, rate: float = 0.0) -> np.ndarray:
+    """Angles (times,) of a pendulum, a'' = -square sin a, from an angle (rad) and a rate (rad/s) at
+    time 0."""
+    given = {"t_eval": times, **EXACT}
+    return solve_ivp(
+        lambda _, y: [y[1], -square * np.sin(y[0])], (0.0, times[-1]), [angle, rate], **given
+    ).y[0]
+
+
 def as_a_flap(robot: Robot, times: np.ndarray) -> np.ndarray:
     """A pendulum about the hinge, with the inertia of the triangle."""
     structure = robot.structure
     hinge = structure.node_names.index("c")
     lever = structure.p_BN[hinge, 2]
     square = G * lever / (structure.unit_inertia[1, 1] + lever**2)
-    span, start = (0.0, times[-1]), [LEANS[0], 0.0]
-    angle = solve_ivp(
-        lambda _, y: [y[1], -square * np.sin(y[0])], span, start, t_eval=times, **EXACT
-    ).y[0]
+    angle = swing(square, times, angle=LEANS[0])
     moved = np.tile(structure.p_WN, (len(times), 1, 1))
     moved[:, structure.node_names.index("e")] = [0.0, 0.0, 1.0] + 0.3 * along(angle)
     for node in ("a", "b", "c", "d"):

@@ -48,20 +48,3 @@ def test_a_turn_strengthens_the_left_by_what_it_weakens_the_right(scenario):
     np.testing.assert_array_equal(tonic[0], u0)
     once = np.repeat([1.4, 1.0, 0.6], 2)  # extensor and flexor of left, middle, right
     np.testing.assert_allclose(tonic[1], u0 * np.tile(once, 2), rtol=1e-15)
-
-
-def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
-    # Group sizes 2 and 1: a group's elongation is the mean over its cables.
-    actuation = [["outer bottom_left", "outer bottom_right"], ["inner top"]]
-    pathways = {"cpg.signals": "live", "cpg.feedback": ["length", "load", "pitch"]}
-    other = scenario.with_changes({"robot.actuation": actuation} | pathways)
-    senses = Robot.of(other).senses
-    assert senses.drivers[:6].tolist() == [0, 0, -1, -1, -1, 1]
-    assert senses.drivers[6:12].tolist() == [2, 2, -1, -1, -1, 3]
-    assert senses.ahead.tolist() == [1, 1, 2, 2, 3, 3, 4, 4]
-    driven = senses.drivers >= 0
-    per_cable = (senses.per_length * senses.neutral_length)[driven]
-    np.testing.assert_allclose(per_cable, [0.5, 0.5, 1.0] * 4, rtol=1e-14)
-    # Five tetrahedra of 20.29 g weigh 5 * 0.02029 kg * 9.80665 m/s^2 = 0.9949 N.
-    assert 1.0 / senses.per_load[0] == pytest.approx(0.9949, rel=1e-3)
-    assert senses.carriers.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]

@@ -1,11 +1,9 @@
 """The path of the centre: its curvature and the heading along it."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
-from helpers.prism import make_prism
 
 from tetra_drake.laws.curves import curvature
 from tetra_drake.robot.measures import follow
@@ -73,11 +71,3 @@ def test_the_heading_of_a_row_counts_whole_turns_and_its_centre_is_that_of_mass(
     expected = [np.cos(headings) / 3.0, np.sin(headings) / 3.0, 0.1 + 0.0 * headings]
     np.testing.assert_allclose(path.centre, np.transpose(expected), atol=1e-12)
     np.testing.assert_array_equal(path.times, np.arange(30.0))
-
-
-def test_heavy_bodies_draw_the_centre_of_a_structure_which_has_no_heading():
-    structure = dataclasses.replace(make_prism().structure, mass=np.array([0.01, 0.01, 0.02]))
-    # Bodies at 0, 1/3 and 2/3 m, of which the last weighs as much as the others together.
-    path = follow(np.arange(2.0), poses(np.zeros(2)), structure)
-    np.testing.assert_allclose(path.centre[:, 0], (1 / 3 + 2 * 2 / 3) / 4)
-    assert np.isnan(path.heading).all()

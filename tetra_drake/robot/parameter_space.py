@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.errors import InputError, check_type, check_whole
+from tetra_drake.errors import InputError, check_type, check_whole, checked_numbers
 from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.robot.gait import Body, Gait, check_parameters
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -163,14 +163,7 @@ class ParameterSpace:
 
     def _numbers(self, vector: npt.ArrayLike) -> Vector:
         """A copy of a vector. Raises InputError unless it has a number for each parameter."""
-        try:
-            given = np.array(vector)
-        except ValueError:  # rows of different lengths
-            given = np.array(None)
-        if given.shape != (len(self.names),) or given.dtype.kind not in "iuf":
-            problem = f"found {vector!r:.60}, expected {len(self.names)} numbers"
-            raise InputError("ParameterSpace", "vector", problem)
-        return given.astype(np.float64)
+        return checked_numbers(vector, (len(self.names),), source="ParameterSpace", key="vector")
 
 
 WALKING_SEED = 80
