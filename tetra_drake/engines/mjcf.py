@@ -351,15 +351,10 @@ def _add_joints(model: Element, structure: Structure, *, step: float) -> None:
         k = 1.0 / (step * (step + 2.0 * time_constant))
         per_mass = 1.0 / structure.mass[body_a] + 1.0 / structure.mass[body_b]
         impedance = stiffness * per_mass / (k + stiffness * per_mass)
-        names = structure.node_names
-        add_element(
-            constraints,
-            "connect",
-            site1=names[first],
-            site2=names[second],
-            solref=[-k * impedance, -k * time_constant * impedance],
-            solimp=[impedance, impedance, 1, 0.5, 1],
-        )
+        ends = {"site1": structure.node_names[first], "site2": structure.node_names[second]}
+        solref = [-k * impedance, -k * time_constant * impedance]
+        solimp = [impedance, impedance, 1, 0.5, 1]
+        add_element(constraints, "connect", **ends, solref=solref, solimp=solimp)
 
 
 def _add_push(

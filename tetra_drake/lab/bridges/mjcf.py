@@ -377,21 +377,21 @@ class _MjcfTranslation:
 
     def _joins(self) -> Iterator[tuple[str, list[tuple[int, np.ndarray]], float]]:
         model, mujoco = self.model, self.mujoco
-        turns = model.actuator_gear[model.actuator_outadr, 3:].any(axis=1)
-        is_brake = turns & model.actuator_forcelimited & (self.pushes[:, 2] < 0.0)
+        is_brake = model.actuator_forcelimited & (self.pushes[:, 2] < 0.0)
         is_brake &= model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
         for eq in self._equalities(mujoco.mjtEq.mjEQ_CONNECT):
-            sites = model.eq_obj2id[eq], model.eq_obj1id[eq]
-            brakes = is_brake & (model.actuator_trnid == sites).all(axis=1)
+            ends = model.eq_obj2id[eq], model.eq_obj1id[eq]
+            brakes = is_brake & (model.actuator_trnid == ends).all(axis=1)
+            brakes &= model.eq_objtype[eq] == mujoco.mjtObj.mjOBJ_SITE
             self.driven[brakes] = _NODE
             friction = model.actuator_forcerange[brakes, 1].max(initial=0.0)
             yield self._name("equality", eq), self._ends_of(eq), float(friction)
         for joint in np.flatnonzero(self.is_ball).tolist():
             body = model.jnt_bodyid[joint]
             roots = self.roots[[model.body_parentid[body], body]].tolist()
-            ends = [(root, self.data.xanchor[joint]) for root in roots]
+            places = [(root, self.data.xanchor[joint]) for root in roots]
             friction = model.dof_frictionloss[model.jnt_dofadr[joint]]
-            yield self._name("joint", joint), ends, float(friction)
+            yield self._name("joint", joint), places, float(friction)
 
     def _joints(self) -> tuple[Tree, Tree]:
         """Joints of two bodies, and anchors, from joints with the world."""
@@ -493,8 +493,7 @@ class _MjcfTranslation:
     def _changes(self) -> Iterator[tuple[str, str, Any]]:
         """What is told of elements that are changed or left out, their kind, and a mask of them."""
         mujoco, model = self.mujoco, self.model
-        rigid = ~(self.is_free | self.is_ball)
-        yield "joints that are neither free nor balls, read as rigid", "joint", rigid
+        yield "other joints, read as rigid", "joint", ~(self.is_free | self.is_ball)
         acting = {"stiffness": model.jnt_stiffness, "stiffnesspoly": model.jnt_stiffnesspoly}
         acting["range"] = model.jnt_range
         for name in ("damping", "dampingpoly", "armature", "frictionloss"):
