@@ -361,9 +361,8 @@ def free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     last call of force_at_rest()."""
     stiffness = stiffness_at_rest(robot).toarray()
     farthest = np.abs(robot.forces.nodes[:, P_WN : P_WN + 3]).max()
-    share = max(
-        LEAST_STIFFNESS, ROUNDING * farthest / (robot.model.bodies.radius.max() or farthest)
-    )
+    rounding = ROUNDING * farthest / (robot.model.bodies.radius.max() or farthest)
+    share = max(LEAST_STIFFNESS, rounding)
     soft = soft_space(stiffness, share * stiffness.diagonal().max())
     return linalg.orth(np.hstack([_rigid_motions(robot, state).T, soft]), rcond=0.1)
 

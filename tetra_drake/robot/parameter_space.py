@@ -54,10 +54,8 @@ class ParameterSpace:
     """Bounds of the numbers of the body, also of fixed ones; see Scenario.evolve."""
     turn: float
     """Steering of all gaits; see Gait.turn."""
-    free_body: tuple[str, ...]
-    """Keys of the numbers of the body that are parameters: their bounds differ."""
     body: slice
-    """Places of the body's numbers in a vector."""
+    """Places in a vector of the body's numbers that are parameters: their bounds differ."""
     names: tuple[str, ...]
     """Names such as "weight 3->1 extensor", "gain length", "robot.density", "tau_A"."""
     low: Vector
@@ -87,7 +85,6 @@ class ParameterSpace:
             parameters=scenario.parameters,
             evolve=scenario.evolve,
             turn=scenario.gait_bounds.turn,
-            free_body=tuple(free),
             body=slice(len(alone), len(alone) + len(free)),
             names=names,
             low=low,
@@ -129,7 +126,7 @@ class ParameterSpace:
     def _body_numbers(self, gait: Gait) -> dict[str, float]:
         """Numbers in SI of the body of a gait that are parameters, by key."""
         given, body = dict(gait.body), {}
-        for key in self.free_body:
+        for key in self.names[self.body]:
             if key not in given:
                 raise InputError("ParameterSpace", f"gait {gait.name}", f"lacks the body's {key}")
             unit, value = getattr(self.evolve[key][0], "unit", ""), given[key]
