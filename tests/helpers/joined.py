@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from verification_references import double_angles
+from verification import completed
+from verification_references import formula
 
 from helpers.anchored import TREES, scenario_of, supported_prism
 from tetra_drake.robot.robot import Robot
@@ -104,7 +105,9 @@ def folded(duration: float = 0.4) -> Robot:
 
 def as_a_double_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
     """Lagrange's equations of two bars, for their angles from the vertical."""
-    upper, lower = double_angles(LEANS, times)
+    problem, (a, b) = completed("double_pendulum"), LEANS
+    states = problem["states"] | {"a": [a, "a_rate"], "b": [b, "b_rate"]}
+    upper, lower = formula(times, problem | {"states": states, "known": "array([a, b])"})
     knee = UPPER * along(upper)
     return np.stack([0.0 * knee, knee, knee, knee + LOWER * along(lower)], axis=1)
 

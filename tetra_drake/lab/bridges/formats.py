@@ -10,7 +10,7 @@ from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
 from tetra_drake.scenario.structure_files import KEYS_OF_NTRT, XML_SUFFIXES
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
-from tetra_drake.settings.section import Tree, keys_of, written
+from tetra_drake.settings.section import Tree, written
 
 SCENARIO_KEYS = {"base", "robot"}
 """Keys that distinguish the files: each scenario file has one of them, and no structure file has
@@ -50,5 +50,5 @@ def save_structure(structure: StructureFile, path: Path, *, source: str) -> None
 def _read(file: Path) -> Tree:
     """Content of a YAML file that holds a structure, a scenario or a structure of NTRT. Raises
     InputError for any other content."""
-    keys = [*keys_of(StructureFile), *SCENARIO_KEYS, *KEYS_OF_NTRT]
+    keys = [*StructureFile.model_fields, *SCENARIO_KEYS, *KEYS_OF_NTRT]
     return read_mapping(file, "structure file", keys=keys)

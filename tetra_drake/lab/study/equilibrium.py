@@ -91,13 +91,7 @@ class EquilibriumStudy:
         lifted = dataclasses.replace(structure, contacts=nowhere, node_load=no_load)
         weightless = scenario.with_numbers({"robot.gravity": 0.0})
         alone = equilibrium_of(weightless, lifted, self.robot.equilibrium.state)
-        return find_statics(
-            p_WN=node_positions(lifted, alone.state),
-            body_of_node=structure.carriers,
-            segments=structure.segments,
-            held=structure.held,
-            joints=structure.joints,
-        )
+        return find_statics(structure, node_positions(lifted, alone.state))
 
     @functools.cached_property
     def frequencies(self) -> np.ndarray:
