@@ -49,7 +49,7 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.settings.refusals import no_such
-from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
+from tetra_drake.visualization.replay import FRAMES_PER_SECOND, Replay
 
 _LARGE = 50
 """Number of bodies from which modes are not computed."""
@@ -356,14 +356,8 @@ def save_structure_page(study: EquilibriumStudy, path: Path, *, mode: int | None
         trajectory[name][:] = trajectory[name].values[-1]
     frames = frequencies.repeat(_SWING)
     shown = {"what": "mode at", "unit": " Hz", "digits": 2, "values": [*frames, *frames[-1:]]}
-    save_replay(
-        path,
-        robot=robot,
-        trajectory=trajectory,
-        title=title,
-        progress=shown if frames.size else None,
-        text=structure_text(study),
-    )
+    progress = shown if frames.size else None
+    Replay(robot, trajectory, title, progress, text=structure_text(study)).save(path)
 
 
 def _shown_modes(study: EquilibriumStudy, mode: int | None) -> tuple[str, np.ndarray, np.ndarray]:
