@@ -29,7 +29,7 @@ def format_of(name_or_file: str | Path) -> str:
         return "structure"
     if name in shipped_scenarios():
         return "scenario"
-    keys = [*keys_of(StructureFile), *SCENARIO_KEYS, *KEYS_OF_NTRT]
+    keys = [*StructureFile.model_fields, *SCENARIO_KEYS, *KEYS_OF_NTRT]
     is_file = os.path.isfile(name)
     content = read_mapping(Path(name), "structure file", keys=keys) if is_file else {}
     if not KEYS_OF_NTRT.isdisjoint(content):
