@@ -58,7 +58,7 @@ def formula(times: Array, case: Case) -> Array:
     rates = [code(rate) for _, rate in states.values()]
     derived = {name: code(text) for name, text in case.get("let", {}).items()}
 
-    def names_at(t: Any, y: Sequence[Any]) -> dict[str, Any]:
+    def names_at(t: Any, y: Any) -> dict[str, Any]:
         names = {**case, "t": t, **dict(zip(states, y, strict=True))}
         for name, each in derived.items():
             names[name] = eval(each, FUNCTIONS, names)
