@@ -127,3 +127,9 @@ def test_simulate_gives_the_same_numbers_of_seed_and_gait_and_replay_the_same_pa
         assert main(["replay", *source, "--out", "sub/again.html"]) == 0
         assert (work / "sub/again.html").read_bytes() == (out / "replay.html").read_bytes()
         assert capsys.readouterr().out.splitlines()[-1].endswith("again.html")
+
+
+@pytest.mark.parametrize("rate", ["100", "100 Hz", "0.1 kHz"])
+def test_a_rate_is_in_hertz_where_it_has_no_unit(rate):
+    parsed = make_parser().parse_args(["export", "gait.json", "--rate", rate, "--out", "a"])
+    assert parsed.rate == 100.0

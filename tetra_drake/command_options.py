@@ -29,7 +29,11 @@ File = Annotated[Path, Option(metavar="FILE", type=Path)]
 Count = Annotated[int, Option(metavar="N", type=partial(integer, least=1))]
 Seed = Annotated[int, Option(metavar="N", type=partial(integer, least=0))]
 Rate = Annotated[
-    float, Option(metavar="RATE", type=quantity("Hz", "100 Hz", least="0.001 Hz", most="1 MHz"))
+    float,
+    Option(
+        metavar="RATE",
+        type=quantity("Hz", "100 Hz", least="0.001 Hz", most="1 MHz", plain=True),
+    ),
 ]
 Reach = Annotated[
     float,

@@ -142,13 +142,19 @@ def number(text: str, *, least: float, most: float) -> float:
     raise argparse.ArgumentTypeError(f"found '{text}', expected a number, {least} to {most}")
 
 
-def quantity(unit: str, example: str, *, least: str, most: str) -> Callable[[str], float]:
+def quantity(
+    unit: str, example: str, *, least: str, most: str, plain: bool = False
+) -> Callable[[str], float]:
     """Makes a function that reads a quantity from the text of an option, such as "100 Hz", and
-    returns it as a number in the SI unit `unit`. The limits `least` and `most` are texts with
-    units. Errors name the `example`, or its unit."""
+    returns it as a number in the SI unit `unit`. A plain number is refused, unless it is allowed to
+    be in this unit. The limits `least` and `most` are texts with units. Errors name the `example`,
+    or its unit."""
 
     def read(text: str) -> float:
-        if re.fullmatch(r"[\d.]+", text):
+        is_plain = re.fullmatch(r"[\d.]+", text)
+        if is_plain and plain:
+            text = f"{text} {unit}"
+        elif is_plain:
             advice = f"did you mean '{text} {example.split()[1]}'?"
             raise argparse.ArgumentTypeError(f"found '{text}' without a unit; {advice}")
         try:

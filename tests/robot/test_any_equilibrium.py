@@ -76,20 +76,6 @@ def test_bodies_stay_where_they_are_if_their_cable_is_slack(gravity, height):
     assert tensions(robot).tolist() == [0.0]
 
 
-def test_a_chain_of_bars_hangs_straight_from_wherever_it_is_let_go():
-    # A mechanism that only gravity holds.
-    tree = TREES["chain"]
-    robot, nodes = Robot.of(scenario_of(tree)), tree["nodes"]
-    mass = robot.structure.mass
-    below = np.array([mass.sum(), mass[1]]) * G  # N, borne by each cable
-    assert tensions(robot) == pytest.approx(below, rel=1e-9)
-    bars = [
-        np.linalg.norm(np.subtract(nodes[j], nodes[i])) for i, j in tree["struts"]["bar"]["pairs"]
-    ]
-    end = 2.0 - sum(bars) - (0.2 + below / 100.0).sum()
-    assert places(robot)["d"] == pytest.approx([0.0, 0.0, end], abs=1e-9)
-
-
 @pytest.mark.parametrize("stiffness", [1e3, 1e6, 1e9])
 def test_a_pendulum_swings_down_however_stiff_its_cable(stiffness, monkeypatch):
     # From level; uncorrected straight steps would number (stiffness * length / weight)^(1/3).

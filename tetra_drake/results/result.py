@@ -44,6 +44,8 @@ from tetra_drake.settings.section import Section
 if TYPE_CHECKING:
     import xarray
 
+    from tetra_drake.visualization.replay import Replay
+
 
 class IntegratorWork(Section):
     """Computing work of an integrator in one simulation: its scheme and accuracy, and numbers of
@@ -131,18 +133,18 @@ class SimulationResult:
 
     def replay_page(self) -> str:
         """The HTML page that save_replay() writes."""
-        from tetra_drake.visualization.replay import replay_page
-
-        return replay_page(robot=self.robot, trajectory=self.trajectory, title=self.title)[0]
+        return self._replay.page()[0]
 
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
         """Writes an HTML page that plays the motion to the file `path`. For `viewer`, see
-        visualization.replay.save_replay(). Raises InputError if no trajectory was recorded."""
-        from tetra_drake.visualization.replay import save_replay
+        visualization.replay.Replay.save(). Raises InputError if no trajectory was recorded."""
+        self._replay.save(path, viewer=viewer)
 
-        save_replay(
-            path, robot=self.robot, trajectory=self.trajectory, title=self.title, viewer=viewer
-        )
+    @property
+    def _replay(self) -> Replay:
+        from tetra_drake.visualization.replay import Replay
+
+        return Replay(self.robot, self.trajectory, self.title)
 
     def save_video(
         self,
