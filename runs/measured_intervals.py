@@ -48,7 +48,7 @@ from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.settling import axial_forces
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.scenario import Scenario, scenario_of
+from tetra_drake.scenario.scenario import Scenario
 
 KEPT = HERE / "predictions"
 """Folder of the finished cases. A case whose file is there is not computed again."""
@@ -287,7 +287,7 @@ def simplex_frequencies(
         structure = structure_of(scenario)
         bars = [(mode[a], mode[b]) for a, b in structure.struts["tube"].pairs]
         ropes = [tuple(map(mode.__getitem__, cable.split()[1:])) for cable in study.cables.index]
-        masses = structure_of(scenario_of(study.robot.scenario)).masses
+        masses = structure_of(study.robot.scenario).masses
         moving = sum(masses[node] * mode[node] @ mode[node] for node in VIBRATING)
         moving += TUBE / 3.0 * sum(a @ a + a @ b + b @ b for a, b in bars)
         less = CABLE / 6.0 * sum((a - b) @ (a - b) for a, b in ropes)

@@ -58,7 +58,7 @@ def formula(times: Array, case: Case) -> Array:
     rates = [code(rate) for _, rate in states.values()]
     derived = {name: code(text) for name, text in case.get("let", {}).items()}
 
-    def names_at(t: Any, y: Sequence[Any]) -> dict[str, Any]:
+    def names_at(t: Any, y: Any) -> dict[str, Any]:
         names = {**case, "t": t, **dict(zip(states, y, strict=True))}
         for name, each in derived.items():
             names[name] = eval(each, FUNCTIONS, names)
@@ -86,7 +86,7 @@ def four_bar_tree(windows: int, rod: Case) -> dict[str, Any]:
     cranks = {f"a{i} b{i}": spin for i in range(windows + 1)}
     return {
         "nodes": nodes,
-        "struts": {"rod": rod | {"pairs": pairs}},
+        "struts": {"rod": {**rod, "pairs": pairs}},
         "pinned": [f"b{i}" for i in range(windows + 1)],
         "anchors": {"w": "xyz"} | {f"a{i}": "xyz" for i in range(windows + 1)},
         "start": {"rest": False, "velocity": ["1 m/s", 0, 0], "bodies": cranks},
@@ -157,7 +157,7 @@ def disk_tree(count: int, disk: Case) -> dict[str, Any]:
     """A disk of 0.1 m as a ring of nodes."""
     angles = 2.0 * np.pi * np.arange(count) / count - 0.5 * np.pi
     nodes = {f"r{i}": [0.1 * math.cos(a), 0.1 * math.sin(a), 0] for i, a in enumerate(angles)}
-    body = disk | {"nodes": [*nodes], "centre": [0, 0, 0]}
+    body = {**disk, "nodes": [*nodes], "centre": [0, 0, 0]}
     return {"nodes": nodes | {"w": [0, 9, 0]}, "bodies": {"disk": body}, "contacts": [*nodes]}
 
 
@@ -183,7 +183,7 @@ def beads_tree(places: Sequence[Sequence[float]], count: int, law: Case) -> dict
     return {
         "nodes": nodes,
         "masses": {f"b{i}": "10 g" for i in range(1, count + 1)},
-        "cables": {"link": law | {"pairs": [list(pair) for pair in itertools.pairwise(nodes)]}},
+        "cables": {"link": {**law, "pairs": [list(pair) for pair in itertools.pairwise(nodes)]}},
     }
 
 
@@ -252,7 +252,7 @@ def prism_of(count: int, twist: float, density: float, stiffness: float) -> Equi
     for name, (length, own) in sizes.items():
         free = f"{length * (1.0 - own / stiffness)!r} m"
         cables[name] = k | {"pairs": pairs[name], "free_length": free}
-    bar = {"diameter": "4 mm", "density": "1200 kg/m^3", "node_diameter": "0 m"}
+    bar: dict[str, Any] = {"diameter": "4 mm", "density": "1200 kg/m^3", "node_diameter": "0 m"}
     bar |= {"contact_radius": "0 m", "pairs": [[f"a{i}", f"b{j}"] for i, j in ring]}
     return at_rest(nodes=nodes, struts={"bar": bar}, cables=cables)
 
@@ -280,7 +280,8 @@ def rope_modes(tree: dict[str, Any]) -> tuple[Array, Array, Array]:
 
 
 def rings(_: Any) -> tuple[Array, Array, Array]:
-    tau, fatigue, beta, found = 0.1, 0.6, 2.5, []
+    tau, fatigue, beta = 0.1, 0.6, 2.5
+    found, expected = list[float](), list[float]()
     for count, weight in ((2, 1.0 + tau / fatigue), (3, 2.5), (5, 2.5)):
         weights = np.zeros((count + count % 2,) * 2)
         for i in range(count):
@@ -295,8 +296,15 @@ def rings(_: Any) -> tuple[Array, Array, Array]:
             simulator.AdvanceTo(time)
             states.append(simulator.get_context().get_continuous_state_vector().CopyToVector()[0])
         found.append(period(times, np.array(states)))
-    pair = 2.0 * math.pi * math.sqrt(tau * fatigue / (beta - tau / fatigue))
-    return np.array([2, 3, 5]), np.array(found), np.array([pair, 0.3271, 0.6405])
+
+        def rate(_: float, y: Array, weights: Array = weights) -> Array:
+            u, v = y.reshape(2, -1)
+            y = np.maximum(u, 0.0)
+            return np.append((1.0 - u - beta * v - weights @ y) / tau, (y - v) / fatigue)
+
+        expected.append(period(times, solved(rate, start, times, max_step=1e-2)[0]))
+    expected[0] = 2.0 * math.pi * math.sqrt(tau * fatigue / (beta - tau / fatigue))
+    return np.array([2, 3, 5]), np.array(found), np.array(expected)
 
 
 def period(times: Array, values: Array) -> float:

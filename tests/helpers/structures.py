@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
+from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
@@ -18,7 +20,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -27,6 +28,12 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
     """The robot whose bodies move at t = 0, with angular velocities (rad/s) and velocities (m/s)
     (bodies, 6)."""
     return dataclasses.replace(robot, structure=dataclasses.replace(robot.structure, v_WB=v_WB))
+
+
+def motion_of(robot: Robot, *, seed: int = 0) -> xarray.Dataset:
+    """The trajectory of a robot that walks by a seeded gait on the engine of its scenario."""
+    walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, seed))
+    return engine_of(robot.scenario).simulate(walk, record=True).trajectory
 
 
 def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:
@@ -59,18 +66,6 @@ def unit_inertias(structure: Structure) -> np.ndarray:
     """Inertias divided by the masses (m²), in the frames of the bodies: (bodies, 3, 3)."""
     xx, yy, zz, xy, xz, yz = structure.unit_inertia.T
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
-
-
-def joined_nodes(given: StructureFile | Tetrahedra) -> dict[str, Any]:
-    """The nodes of a robot and what joins them, as statics takes them."""
-    blueprint = given.blueprint()
-    return {
-        "p_WN": blueprint.p_WN,
-        "body_of_node": blueprint.carriers,
-        "segments": blueprint.segments,
-        "held": blueprint.held,
-        "joints": blueprint.joints,
-    }
 
 
 SIDES_ALONE = {"first": ["side n0 n3"], "second": ["side n1 n4"], "third": ["side n2 n5"]}

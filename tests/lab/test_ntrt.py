@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import yaml
 from helpers.files import DATA
-from helpers.structures import joined_nodes
 
 from tetra_drake.errors import InputError
 from tetra_drake.lab.bridges.conversion import converted
@@ -46,7 +45,8 @@ def test_a_prism_in_decimetres() -> None:
     names = {"horizontal/string low1 low2", "vertical/string low1 high1"}
     assert names < {*given.blueprint().cable_names}
     assert given.body_count == 3
-    statics = find_statics(**joined_nodes(given))
+    blueprint = given.blueprint()
+    statics = find_statics(blueprint, blueprint.p_WN)
     assert (len(statics.self_stresses), statics.mechanisms) == (1, 1)
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TypeAlias, cast
 
@@ -19,7 +20,7 @@ from tetra_drake.robot.command import (
     driven_robot,
     robot_of_controller,
 )
-from tetra_drake.robot.gait import SteeringSignal, constant_steering
+from tetra_drake.robot.gait import Gait, SteeringSignal, constant_steering
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -139,32 +140,46 @@ def simulate_many(
     if len(scenarios) != len(gaits):
         problem = f"found {len(scenarios)}, expected one, or one for each of {len(gaits)} gaits"
         raise InputError("simulate_many", "scenario", problem)
-    threads = min(threads_for(workers, source="simulate_many"), max(1, len(gaits)))
-    if not all(engine_of(each).has_threads for each in scenarios):
-        threads = 1
-    drivers: list[Driver] = [
-        gait if isinstance(gait, Command) else given_gait(gait, each)
+    threads = threads_for(workers, source="simulate_many")
+    walks: list[tuple[Scenario, Driver]] = [
+        (each, gait if isinstance(gait, Command) else given_gait(gait, each))
         for gait, each in zip(gaits, scenarios, strict=True)
     ]
+    outcomes: list[Outcome] = []
+    with contextlib.closing(simulate_each(walks, record=record, threads=threads)) as found:
+        for outcome, (each, driver) in zip(found, walks, strict=True):
+            if isinstance(outcome, InputError):
+                raise outcome
+            if isinstance(outcome, SimulationFailure):
+                outcome.scenario, outcome.name = each, driver.name
+                outcome.gait = None if isinstance(driver, Command) else driver
+            outcomes.append(outcome)
+    return outcomes
+
+
+def simulate_each(
+    walks: Sequence[tuple[Scenario, Driver]], *, record: bool = False, threads: int
+) -> Generator[Outcome | InputError]:
+    """Simulates gaits or commands, each on its scenario, by at most `threads` threads. Yields their
+    results in order; in place of a result the failure of a simulation, or why it cannot start."""
+    threads = min(threads, max(1, len(walks)))
+    if not all(engine_of(scenario).has_threads for scenario, _ in walks):
+        threads = 1
     with SimulationQueue(threads, record=record) as queue:
-        futures = queue.submit(zip(scenarios, drivers, strict=True))
-        outcomes: list[Outcome] = []
-        for future, each, driver in zip(futures, scenarios, drivers, strict=True):
+        for future in queue.submit(walks):
             try:
-                outcomes.append(future.result())
-            except SimulationFailure as failure:
-                failure.scenario, failure.name = each, driver.name
-                failure.gait = None if isinstance(driver, Command) else driver
-                outcomes.append(failure)
-        return outcomes
+                yield future.result()
+            except (InputError, SimulationFailure) as error:
+                yield error
 
 
-def check_scenario(scenario: Scenario) -> None:
+def check_scenario(scenario: Scenario, gait: Gait | None = None) -> None:
     """Raises InputError if gaits cannot be simulated on a scenario: its engine does not support it,
-    the robot would start in the ground, or no oscillator drives it."""
+    the robot would start in the ground, or no oscillator drives it. Also if `gait` is for another
+    robot."""
     if not scenario.oscillators:
         problem = "found no oscillator, expected at least one that drives cables"
         raise InputError(scenario.name, "robot.actuated", problem)
-    robot, gait = Robot.of(scenario), seeded_gait(scenario)
-    driven_robot(scenario, gait, robot=robot).oscillators  # noqa: B018
+    robot, walking = Robot.of(scenario), gait or seeded_gait(scenario)
+    driven_robot(scenario, walking, robot=robot).oscillators  # noqa: B018
     engine_of(scenario).check(scenario)

@@ -49,6 +49,7 @@ from tetra_drake.scenario.metrics import UNITS, inverse
 from tetra_drake.scenario.scenario import Scenario
 
 _FIRST = 10  # simulations; the axes of costs begin here
+_NEVER = 1e18  # simulations, in place of infinitely many
 _BESIDE = 5.5  # least width (in) of two panels side by side, with letters of the usual size
 
 
@@ -297,20 +298,6 @@ def _curve(progress: pandas.DataFrame, end: int) -> pandas.DataFrame:
     return best.index.to_frame(index=False).assign(mean=mean, low=low, high=high)
 
 
-def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
-    """Lower quartile, median and upper quartile along the first axis, with linear interpolation.
-    Unlike numpy's they are not NaN if values are infinite."""
-    ordered = np.sort(values, axis=0)
-    quartiles = []
-    for share in (0.25, 0.5, 0.75):
-        weight, place = math.modf(share * (len(values) - 1))
-        quartile = ordered[int(place)]
-        if weight > 0.0:
-            quartile = (1.0 - weight) * quartile + weight * ordered[int(place) + 1]
-        quartiles.append(quartile)
-    return quartiles
-
-
 def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     """The row of Compared.runs for one run, by column: medians, means and intervals of its trials.
     Input: the table of _trials()."""
@@ -322,7 +309,10 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
         row[f"{name}_mean"] = interquartile_mean(values) if len(values) else math.nan
         row[f"{name}_low"], row[f"{name}_high"] = interval(values, interquartile_mean)
     reached = trials["reached"].to_numpy()
-    row["reached_low"], row["reached"], row["reached_high"] = _quartiles(reached)
+    # Between infinite numbers NumPy interpolates to NaN.
+    quartiles = np.quantile(reached.clip(max=_NEVER), [0.25, 0.5, 0.75])
+    quartiles[quartiles > 0.1 * _NEVER] = math.inf
+    row["reached_low"], row["reached"], row["reached_high"] = quartiles
     row["share"] = float(np.isfinite(reached).mean())
     return row
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.linalg import null_space
 
 from tetra_drake.errors import InputError, check_type
-from tetra_drake.lab.study.statics import TOLERANCE, find_statics, null_space
+from tetra_drake.lab.study.statics import TOLERANCE, find_statics
 from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -82,13 +83,7 @@ def _check_range(structure: Structure, tensions: Mapping[str, float]) -> None:
 def _tensions(structure: Structure, groups: list[str], wanted: Mapping[str, float]) -> list[float]:
     """Tension (N) of each group of cables in self-stress, if some groups have the `wanted`
     tensions. Raises InputError if there is not exactly one such state."""
-    states = find_statics(
-        p_WN=structure.p_WN,
-        body_of_node=structure.carriers,
-        segments=structure.segments,
-        held=structure.held,
-        joints=structure.joints,
-    ).self_stresses
+    states = find_statics(structure, structure.p_WN).self_stresses
     is_member = np.array([[name == group for group in groups] for name in structure.cable_groups])
     # Vectors [c, g]: states.T c are the tensions of the cables, equal to g of their groups.
     found = null_space(np.hstack([states.T, -is_member.astype(float)]), TOLERANCE)[len(states) :]

@@ -56,7 +56,7 @@ def write_page(
     caption: str,
     second: TextTable,
     content: str,
-) -> list[str]:
+) -> None:
     """Writes the page of a study, as HTML to the file `name` and in Markdown to README.md.
 
     Args:
@@ -71,9 +71,6 @@ def write_page(
         caption: what the figure shows, for readers who do not see it.
         second: a further table, below the figure.
         content: what the scenario's file has, such as "has the fitted values".
-
-    Returns:
-        The names of the files.
 
     Raises:
         InputError: if a file cannot be written.
@@ -92,4 +89,3 @@ def write_page(
     shown = {"title": title, "about": about, "table": table, "notes": notes, "unknown": unknown}
     shown |= {"figure": figure, "caption": caption, "second": second, "content": content}
     write_whole(folder / name, render("lab/page.html.jinja", **shown, scenario=SCENARIO))
-    return [name, README]

@@ -60,7 +60,7 @@ excess, and the mean square of the weighted residuals of one coordinate or anoth
 STRONG = 0.95
 """Correlation above which a warning names two parameters."""
 
-PAGE = "fit.html"
+PAGE, FIGURE = "fit.html", "residuals.figure"
 
 MANY = 100
 """Number of points in a panel of the figure from which on they are drawn small."""
@@ -195,14 +195,13 @@ def fit(
             raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
     given = FitFile.from_tree({"parameters": parameters, "measurements": measurements}, source)
     problem = _problem(given_scenario(scenario), given, folder, say, source)
-    start = problem.start
-    if not np.isfinite(problem.residuals(start)).all():
+    if not np.isfinite(problem.residuals(problem.start)).all():
         what = "is not simulated, or lacks equilibrium or frequencies, with the start values"
         raise InputError(problem.scenario.name, "", what)
 
     solution = least_squares(
         problem.residuals,
-        _searched(problem, start) if search else start,
+        _searched(problem) if search else problem.start,
         jac=problem.jacobian,
         bounds=problem.bounds,
         x_scale="jac",
@@ -210,9 +209,8 @@ def fit(
         xtol=TOLERANCE,
         gtol=np.finfo(float).eps,  # without it, no influence and no residual give NaN
     )
-    found = _result(
-        problem, start, unknowns_of(solution, "parameters"), time.perf_counter() - began
-    )
+    fitted = unknowns_of(solution, "parameters")
+    found = _result(problem, fitted, time.perf_counter() - began)
     if folder is not None:
         save_fit(found, folder)
     return found
@@ -244,11 +242,10 @@ def _problem(
     return FitProblem(scenario, fitted, measured, digest.hexdigest(), folder, say)
 
 
-def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:
+def _searched(problem: FitProblem) -> np.ndarray:
     """Best point (n,) of a global search within the bounds, by CMA-ES, for the least sum of squares
-    of residuals. `start` (n,) is where it begins. The search ends when it has converged roughly;
-    least squares refine its point."""
-    low, high = problem.bounds
+    of residuals. The search ends when it has converged roughly; least squares refine its point."""
+    (low, high), start = problem.bounds, problem.start
     origin = (start - low) / (high - low)
     search = Search(POPULATION, Box(start.size), np.random.default_rng(0), origin)
     while not search.restarts and search.evaluations < MOST:
@@ -259,11 +256,10 @@ def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:
     return points[np.argmin(problem.sums_of_squares(points))]
 
 
-def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: float) -> Fit:
-    """Result of a fit that began at the point `start` (n,) and ended at the solution `x` (n,), with
-    intervals and warnings. Points are in the dimensionless parameters of FitProblem; `wall_time` is
-    in s."""
-    first, last = problem.residuals(start), problem.residuals(x)
+def _result(problem: FitProblem, x: np.ndarray, wall_time: float) -> Fit:
+    """Result of a fit that ended at the solution `x` (n,), with intervals and warnings. The point
+    is in the dimensionless parameters of FitProblem; `wall_time` is in s."""
+    first, last = problem.residuals(problem.start), problem.residuals(x)
     misfit, jacobian = problem.misfit(last), problem.jacobian(x)
     half, correlation = _uncertainty(problem, jacobian, misfit)
     difference = np.linalg.norm(problem.jacobian(x, LONGER * STEP) - jacobian, axis=0)
@@ -357,10 +353,9 @@ def _warnings(
     return warnings
 
 
-def save_fit(fit: Fit, folder: Path) -> list[str]:
+def save_fit(fit: Fit, folder: Path) -> None:
     """Writes the scenario with the fitted values, tables, the figure of the residuals, and a page
-    in Markdown and HTML to a folder. Returns the names of the files. Raises InputError if one
-    cannot be written."""
+    in Markdown and HTML to a folder. Raises InputError if a file cannot be written."""
     save_scenario(folder, fit.scenario)
     tables = {
         "parameters": fit.parameters.reset_index(),
@@ -376,9 +371,7 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
         "evaluations": fit.evaluations,
         "wall_time_s": fit.wall_time,
     }
-    figure = residuals(fit)
-    written = save_findings(figure, folder, "residuals.figure", tables=tables, summary=summary)
-
+    save_findings(residuals(fit), folder, FIGURE, tables=tables, summary=summary)
     rows = [[str(key), *map(fixed, row)] for key, *row in fit.correlations.itertuples()]
     correlations = TextTable(["correlation", *map(str, fit.correlations)], rows)
     about = (
@@ -390,7 +383,7 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
         "by its root; far above 1 there are none. The tolerance of a value counts as a measurement."
     )
     unknown = UNKNOWN.replace("\n", " ") if fit.parameters["low"].isna().any() else ""
-    pages = write_page(
+    write_page(
         folder,
         PAGE,
         title=f"Fit of {fit.scenario.name}",
@@ -398,12 +391,11 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
         table=fit.table,
         notes=fit.notes,
         unknown=unknown,
-        figure="residuals.figure",
+        figure=FIGURE,
         caption="predictions minus measurements",
         second=correlations,
         content="has the fitted values",
     )
-    return [*pages, SCENARIO, *written]
 
 
 @figure_function

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import re
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import NoneType
@@ -18,7 +19,7 @@ import pandas
 
 from tetra_drake import __version__
 from tetra_drake.engines.engine import engine_of
-from tetra_drake.engines.queue import SimulationQueue
+from tetra_drake.engines.simulate import Outcome, simulate_each
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.figures.style import (
     OKABE_ITO,
@@ -46,7 +47,7 @@ from tetra_drake.robot.parameter_space import with_body
 from tetra_drake.robot.remarks import yielding_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import stream
-from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario, save_scenario
+from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.quantities import Quantity
@@ -200,7 +201,7 @@ def predict(
     check_whole("predict", "seed", seed, least=0)
     check_type("predict", "quantities", quantities, Sequence, Mapping)
     check_type("predict", "command", command, Command, NoneType)
-    threads_for(workers, source="predict")
+    threads = threads_for(workers, source="predict")
     given = [quantities] if isinstance(quantities, str) else quantities
     for name in given:
         check_type("predict", "quantities", name, str)
@@ -222,11 +223,11 @@ def predict(
     if not variates:
         expected = "expected the tolerance of a number, such as robot.masses: 2 %"
         raise InputError(f"scenario {scenario.name}", "tolerances", f"found none, {expected}")
-    (nominal,) = _values([scenario], measures, driver, workers)
+    (nominal,) = _values([scenario], measures, driver, threads)
     if isinstance(nominal, Exception):
         raise nominal
     errors = errors_of(variates, seed, draws)
-    found = _values(drawn_scenarios(scenario, variates, errors), measures, driver, workers)
+    found = _values(drawn_scenarios(scenario, variates, errors), measures, driver, threads)
     nothing = [math.nan] * len(measures)
     failures = [str(each) if isinstance(each, Exception) else "" for each in found]
     rows = [nothing if isinstance(each, Exception) else each for each in found]
@@ -308,47 +309,43 @@ def _values(
     scenarios: Sequence[Scenario | InputError],
     measures: Mapping[str, Measure],
     driver: Driver | None,
-    workers: int | None,
+    threads: int,
 ) -> list[list[float] | Exception]:
     """Values of the measures for each scenario, NaN if not finite; or why there are none."""
-    found: list[Any] = [*scenarios]
-    able = {i: each for i, each in enumerate(scenarios) if not isinstance(each, InputError)}
-    if driver is None:
-        for place, each in able.items():
-            try:
-                found[place] = study_equilibrium(Robot.of(each, at_rest=True))
-            except InputError as error:
-                found[place] = error
-    else:
-        threads = min(threads_for(workers, source="predict"), max(1, len(able)))
-        record = any(map(callable, measures.values()))
-        with SimulationQueue(threads, record=record) as queue:
-            futures = queue.submit((each, driver) for each in able.values())
-            for place, future in zip(able, futures, strict=True):
-                try:
-                    found[place] = future.result()
-                except (InputError, SimulationFailure) as error:
-                    found[place] = error
+    able = [each for each in scenarios if isinstance(each, Scenario)]
+    outcomes: Iterable[Outcome | InputError | None] = [None] * len(able)
+    if driver is not None:
+        walks, record = [(each, driver) for each in able], any(map(callable, measures.values()))
+        outcomes = simulate_each(walks, record=record, threads=threads)
+    values = map(_measured, able, outcomes, itertools.repeat(measures))
+    return [next(values) if isinstance(each, Scenario) else each for each in scenarios]
+
+
+def _measured(
+    scenario: Scenario, outcome: Outcome | InputError | None, measures: Mapping[str, Measure]
+) -> list[float] | Exception:
+    """Values of the measures for a scenario and the outcome of its simulation, None for a robot at
+    rest; or why there are none."""
+    if isinstance(outcome, Exception):
+        return outcome
     names = {each for each in measures.values() if isinstance(each, str)}
-    rests = driver is not None and not METRICS.keys() >= names
-    for place, outcome in enumerate(found):
-        if isinstance(outcome, Exception):
-            continue
-        try:
-            known = {} if driver is None else {n: getattr(outcome.metrics, n) for n in METRICS}
-            if rests:
-                known |= values_at_rest(study_equilibrium(Robot.of(able[place], at_rest=True)))
-            elif driver is None and names:
-                known = values_at_rest(outcome)
-            values = [_value(outcome, known, each) for each in measures.values()]
-            found[place] = [value if math.isfinite(value) else math.nan for value in values]
-        except (InputError, SimulationFailure) as error:
-            found[place] = error
-    return found
+    known = {} if outcome is None else {name: getattr(outcome.metrics, name) for name in METRICS}
+    study = None
+    try:
+        if outcome is None or not known.keys() >= names:
+            study = study_equilibrium(Robot.of(scenario, at_rest=True))
+        if study and names:
+            known |= values_at_rest(study)
+        values = [_value(outcome or study, known, each) for each in measures.values()]
+    except (InputError, SimulationFailure) as error:
+        return error
+    return [value if math.isfinite(value) else math.nan for value in values]
 
 
 def _value(
-    outcome: EquilibriumStudy | SimulationResult, known: Mapping[str, float], measure: Measure
+    outcome: EquilibriumStudy | SimulationResult | None,
+    known: Mapping[str, float],
+    measure: Measure,
 ) -> float:
     """Value of a measure in SI. `known` are the numbers of the outcome by name. Raises InputError
     for an unknown name."""
@@ -407,9 +404,9 @@ def shares_of(
     return {key: part / sum(parts.values()) for key, part in parts.items()}
 
 
-def save_predictions(predictions: Predictions, folder: Path) -> list[str]:
-    """Writes the scenario, tables, the figure, and a page in Markdown and HTML to a folder. Returns
-    the names of the files. Raises InputError if one cannot be written."""
+def save_predictions(predictions: Predictions, folder: Path) -> None:
+    """Writes the scenario, tables, the figure, and a page in Markdown and HTML to a folder. Raises
+    InputError if a file cannot be written."""
     save_scenario(folder, predictions.scenario)
     tables = {
         "predictions": predictions.quantities.reset_index(names="quantity"),
@@ -426,8 +423,8 @@ def save_predictions(predictions: Predictions, folder: Path) -> list[str]:
         "wall_time_s": predictions.wall_time,
     }
     figure = predictions_figure(predictions)
-    written = save_findings(figure, folder, FIGURE, tables=tables, summary=summary)
-    pages = write_page(
+    save_findings(figure, folder, FIGURE, tables=tables, summary=summary)
+    write_page(
         folder,
         PAGE,
         title=f"Predictions of {predictions.scenario.name}",
@@ -439,7 +436,6 @@ def save_predictions(predictions: Predictions, folder: Path) -> list[str]:
         second=predictions.table_of_shares,
         content="has the numbers and their tolerances",
     )
-    return [*pages, SCENARIO, *written]
 
 
 @figure_function

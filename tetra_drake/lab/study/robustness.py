@@ -15,8 +15,8 @@ from typing import Any
 
 import pandas
 
-from tetra_drake.engines.simulate import check_scenario, simulate_many
-from tetra_drake.errors import InputError, check_type, check_whole
+from tetra_drake.engines.simulate import check_scenario, simulate_each
+from tetra_drake.errors import check_type, check_whole
 from tetra_drake.figures.style import (
     OKABE_ITO,
     REFERENCE,
@@ -34,7 +34,7 @@ from tetra_drake.figures.style import (
 from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
 from tetra_drake.lab.page import save_findings
 from tetra_drake.lab.study.statistics import interval, json_rows, share_interval
-from tetra_drake.machine import versions
+from tetra_drake.machine import threads_for, versions
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.gait_file import GivenGait, given_gait
@@ -164,7 +164,7 @@ def robustness(
     if not isinstance(gaits, Mapping):
         gait = given_gait(gaits, scenario)
         gaits = {gait.name: gait}
-    walkers = {key: given_gait(gait, scenario) for key, gait in gaits.items()}
+    given = {key: given_gait(gait, scenario) for key, gait in gaits.items()}
     disturbances = scenario.disturbances
     if percent is not None:
         disturbances = default_disturbances(scenario, float(percent))
@@ -188,11 +188,8 @@ def robustness(
             if draw.events:
                 plan.append(({"what": CUTS, "draw": i}, Draw({}, events=draw.events)))
 
-    walks: dict[int, tuple[Scenario, dict[Any, Gait]]] = {}
-    for key, gait in walkers.items():
-        own, bare = with_body(scenario, gait)
-        walks.setdefault(id(own), (own, {}))[1][key] = bare
-    rows = [row for own, group in walks.values() for row in _simulated(own, plan, group, workers)]
+    walkers = {key: with_body(scenario, gait) for key, gait in given.items()}
+    rows = _simulated(plan, walkers, threads_for(workers, source="robustness"))
     changed = [row for row in rows if row["what"] not in (NOTHING, ALL)]
     return Judgement(
         scenario=scenario,
@@ -204,36 +201,29 @@ def robustness(
 
 
 def _simulated(
-    scenario: Scenario, plan: Sequence[_Planned], gaits: Mapping[Any, Gait], workers: int | None
+    plan: Sequence[_Planned], walkers: Mapping[Any, tuple[Scenario, Gait]], threads: int
 ) -> list[dict[str, Any]]:
     """Simulates each gait in each draw of disturbances. Returns a row per simulation: the labels of
     the draw, and the columns that all tables of Judgement have.
 
-    `plan` has pairs: the labels of a draw by column, and the draw. `gaits` are by the key that the
-    column `gait` gets; `workers` is the number of threads.
+    `plan` has pairs: the labels of a draw by column, and the draw. `walkers` have the scenario with
+    the gait's body, and the gait, by the key that the column `gait` gets.
 
     A robot that cannot start is a failure; it may have been displaced into a step of the terrain.
     """
-    check_scenario(scenario)
+    for own, gait in walkers.values():
+        check_scenario(own, gait)
+    bodies = {id(own): own for own, _ in walkers.values()}
     rows: list[dict[str, Any]] = []
-    walking: list[tuple[dict[str, Any], Scenario, Gait]] = []
-    for labels, draw in plan:
-        changed = disturbed(scenario, draw)  # shared by all gaits: the engine prepares it once
-        refusal = None
-        try:
-            check_scenario(changed)
-        except InputError as error:
-            refusal = str(error)
-        for key, gait in gaits.items():
-            rows.append({"gait": key, **labels, "failure": refusal, "missed": ""})
-            if refusal is None:
-                walking.append((rows[-1], changed, gait))
-
-    scenarios, walkers = [each[1] for each in walking], [each[2] for each in walking]
-    results = simulate_many(scenarios, walkers, workers=workers)
-    for (row, _, _), result in zip(walking, results, strict=True):
+    walks: list[tuple[Scenario, Gait]] = []
+    for labels, draw in plan:  # gaits share a scenario: the engine prepares it once
+        changed = {body: disturbed(own, draw) for body, own in bodies.items()}
+        rows += [{"gait": key, **labels, "failure": None, "missed": ""} for key in walkers]
+        walks += [(changed[id(own)], gait) for own, gait in walkers.values()]
+    results = simulate_each(walks, threads=threads)
+    for row, (own, _), result in zip(rows, walks, results, strict=True):
         if isinstance(result, SimulationResult):
-            row["missed"] = ", ".join(unmet_requirements(result.metrics, scenario.require))
+            row["missed"] = ", ".join(unmet_requirements(result.metrics, own.require))
             row |= {"fitness": result.fitness, **result.metrics.to_json()}
         else:
             row["failure"] = str(result)

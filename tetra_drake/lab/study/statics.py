@@ -10,11 +10,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.sparse import csr_array
 
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.robot.equilibrium import soft_space
-from tetra_drake.scenario.blueprint import Segments
+from tetra_drake.scenario.blueprint import Blueprint, Segments
 
 TOLERANCE = 1e-6
 """Singular values below this share of the greatest, or of a bound for it, count as zero. Lengths
@@ -34,35 +35,22 @@ class Statics(NamedTuple):
     axis."""
 
 
-def find_statics(
-    *,
-    p_WN: np.ndarray,
-    body_of_node: np.ndarray,
-    segments: Segments,
-    held: np.ndarray | None = None,
-    joints: np.ndarray | None = None,
-) -> Statics:
-    """Self-stress states and mechanisms of rigid bodies joined by cables and ball joints.
-
-    `held` (nodes, 3) is True where an anchor holds a node along the world's x, y or z axis; by
-    default nothing is held. `joints` (joints, 2) has the two nodes of each joint. For the other
-    arguments see cable_wrenches().
-    """
-    held = np.zeros(p_WN.shape, dtype=bool) if held is None else held
+def find_statics(structure: Blueprint, p_WN: np.ndarray) -> Statics:
+    """Self-stress states and mechanisms of a structure, rigid bodies joined by cables and ball
+    joints, with its nodes at p_WN (nodes, 3) in m."""
+    body_of_node, held, joints = structure.carriers, structure.held, structure.joints
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
-    wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, segments=segments)
+    wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, segments=structure.segments)
     bodies, nodes = body_of_node.max() + 1, np.arange(len(p_WN))
     motions = np.zeros((nodes.size, 3, bodies + 1, 6))  # of nodes, by body and its motions
     motions[nodes, :, body_of_node] = rigid_motions(p_WN)
     motions = motions[:, :, :bodies].reshape(nodes.size, 3, 6 * bodies)
-    constraints = motions[held]
-    if joints is not None:
-        # The spring of a joint acts along a line through the middle of its nodes.
-        middle = rigid_motions(p_WN[joints].mean(axis=1))
-        apart, each = np.zeros((len(joints), 3, bodies, 6)), np.arange(len(joints))
-        apart[each, :, body_of_node[joints[:, 0]]] = middle
-        apart[each, :, body_of_node[joints[:, 1]]] = -middle
-        constraints = np.concatenate([constraints, apart.reshape(-1, 6 * bodies)])
+    # The spring of a joint acts along a line through the middle of its nodes.
+    middle = rigid_motions(p_WN[joints].mean(axis=1))
+    apart, each = np.zeros((len(joints), 3, bodies, 6)), np.arange(len(joints))
+    apart[each, :, body_of_node[joints[:, 0]]] = middle
+    apart[each, :, body_of_node[joints[:, 1]]] = -middle
+    constraints = np.concatenate([motions[held], apart.reshape(-1, 6 * bodies)])
     allowed = null_space(constraints, TOLERANCE)
     felt = csr_array(allowed.T @ wrenches if len(constraints) else wrenches)
     products = (felt.T @ felt).toarray()  # its eigenvalues are the squares of singular values
@@ -86,14 +74,6 @@ def find_statics(
     products = (spins @ spins.T).toarray()
     uncounted = np.linalg.matrix_rank(products, tol=TOLERANCE**2, hermitian=True) if idle else 0
     return Statics(self_stresses.T, mechanisms=int(allowed.shape[1] - rank - uncounted))
-
-
-def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
-    """Orthonormal basis (n, vectors), in columns, of the vectors that a matrix (m, n) maps to 0.
-    Singular values up to `tolerance` times the greatest one count as 0."""
-    _, singular_values, rows = np.linalg.svd(matrix)
-    greatest = singular_values.max(initial=0.0)
-    return np.asarray(rows[np.count_nonzero(singular_values > tolerance * greatest) :].T)
 
 
 def cable_wrenches(*, p_WN: np.ndarray, body_of_node: np.ndarray, segments: Segments) -> np.ndarray:
