@@ -27,7 +27,7 @@ from settle import difference_of_means
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import check_file, write_whole
-from tetra_drake.formatting import TextTable, fixed, listed, ranged
+from tetra_drake.formatting import fixed, listed, ranged
 from tetra_drake.laws.curves import travelling_index
 from tetra_drake.machine import versions
 from tetra_drake.robot.gait import Gait
@@ -248,7 +248,7 @@ def _as_array(values: list[Any]) -> np.ndarray:
     return np.concatenate(values) if len(counts) > 1 else np.array(values)
 
 
-def claims(record: Mapping[str, Any]) -> TextTable:
+def claims(record: Mapping[str, Any]) -> str:
     """Table of the claims: criterion for a case, result as median and range, and verdict.
 
     The template has a line for each claim, so that a criterion in words stands beside its formula.
@@ -260,16 +260,14 @@ def claims(record: Mapping[str, Any]) -> TextTable:
     alike, *directional = numbers["friction"]["evolved"]
     gains = listed([ranged(*difference_of_means(alike, inches)) for inches in directional])
     tools = {"over": over, "each": each, "verdict": verdict, "listed": listed, "gains": gains}
-    text = page.rendered("claims", **numbers, **tools)
-    headings = ["claim of the thesis", "criterion", "result, median (range)", "verdict"]
-    return TextTable(headings, [line.split(" | ") for line in text.splitlines()], range(4))
+    return page.rendered("claims.md", **numbers, **tools)
 
 
 def main(_: Sequence[str] = ()) -> None:
     """Writes the record and prints the table."""
     check_file(MOTION)
     write_whole(MOTION, json.dumps(make_record(), indent=1, allow_nan=False) + "\n")
-    print(read_record(MOTION, claims, "claims.py").markdown())
+    print(read_record(MOTION, claims, "claims.py"))
 
 
 if __name__ == "__main__":

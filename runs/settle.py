@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 from analyse import Analysis, load_analysis
+from page import rendered
 
-from tetra_drake.formatting import TextTable, fixed, ranged
+from tetra_drake.formatting import ranged
 from tetra_drake.lab.study.statistics import interval_of_resamples, resampled
 from tetra_drake.settings.units import INCH
 
@@ -40,11 +41,9 @@ def difference_of_means(one: np.ndarray, other: np.ndarray) -> tuple[float, floa
     return float(other.mean() - one.mean()), *interval_of_resamples(other_means - means)
 
 
-def settled(first: Path, second: Path) -> TextTable:
+def settled(first: Path, second: Path) -> str:
     """Table of the comparison of two runs."""
     one, other = (numbers(load_analysis(run)) for run in (first, second))
-    rows = []
-    for name in one:
-        means = [fixed(values[name].mean()) for values in (one, other)]
-        rows.append([name, *means, ranged(*difference_of_means(one[name], other[name]))])
-    return TextTable(["mean of the trials", first.name, second.name, "difference"], rows)
+    names = {"first": first.name, "second": second.name}
+    tools = {"ranged": ranged, "difference": difference_of_means}
+    return rendered("settled.md", **names, one=one, other=other, **tools)

@@ -221,7 +221,7 @@ def made_again(page: Path, runs: Runs) -> str:
         "gallery": lambda: gallery_table(runs),
         "trust": lambda: trust_table(runs),
         "trials": lambda: trials_table(name, runs),
-        "settled": lambda: settled(HERE / OTHERS[name], HERE / name).markdown(),
+        "settled": lambda: settled(HERE / OTHERS[name], HERE / name),
         "partings": lambda: partings_table(name, "thesis"),
     }
     return filled(read_text(page, "page"), lambda table: tables[table]())

@@ -230,7 +230,7 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
         **simulated,
         trials=tables,
         read={name: readings.results(trials) for name, trials in tables.items()},
-        claims=read_record(MOTION, claims, "claims.py").markdown(),
+        claims=read_record(MOTION, claims, "claims.py").rstrip(),
     )
 
 
