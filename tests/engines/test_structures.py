@@ -1,4 +1,4 @@
-"""Structures: against an independent simulation, the row of tetrahedra, and what they sense.
+"""Structures: against an independent simulation, what they sense, and robots that nothing drives.
 
 In tests/data/structures.json sines pull at the cables of structures at rest, of which the first
 2.5 s are compared. After 5 s, starts 1e-7 m apart end 3e-7 m apart there, and half the step makes
