@@ -36,7 +36,7 @@ from tetra_drake.robot.measures import distance_walked
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
-from tetra_drake.visualization.replay import save_replay
+from tetra_drake.visualization.replay import Replay
 
 RUN = Path(__file__).parents[1] / "runs" / "thesis"
 """A run whose best gait is the default."""
@@ -60,7 +60,7 @@ def main(gait_file: Path | None = None, *, duration: float = 15.0, out: Path = O
     trajectory = make_dataset(robot, sampler.motion())
     walked = scenario.units.shown(distance_walked(trajectory, robot.structure)[-1], "m")
     title = f"{gait.name}: {walked} in {duration:g} s"
-    save_replay(out / "robot.html", robot=robot, trajectory=trajectory, title=title)
+    Replay(robot, trajectory, title).save(out / "robot.html")
     print(title)
     print(f"open {out / 'robot.html'} in a browser to see it walk")
 

@@ -37,6 +37,7 @@ from tetra_drake.command_options import (
     warn,
 )
 from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.files import check_file
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.on_demand import loaded
 from tetra_drake.options import BAD_INPUT, Parser
@@ -270,10 +271,12 @@ def _replay(source: ResultOrGait, *, scenario: ScenarioName | None = None, out: 
 
     Example: tetra-drake replay runs/champion --out champion.html
     """
-    from tetra_drake.report.result_folder import write_replay
+    from tetra_drake.report.result_folder import load_or_simulate
 
-    title = write_replay(source, out, scenario=scenario, warn=warn)
-    print(f"{title}\nto watch the robot, open in a browser: {out}")
+    check_file(out)
+    result = load_or_simulate(source, scenario=scenario, warn=warn)
+    result.save_replay(out)
+    print(f"{result.title}\nto watch the robot, open in a browser: {out}")
 
 
 def _figures(

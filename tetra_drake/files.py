@@ -100,21 +100,16 @@ def file_names(names: Iterable[str]) -> dict[str, str]:
 def make_folder(folder: Path, *, source: Path | None = None) -> None:
     """Makes a folder and its parents if they do not exist. Raises InputError if that fails; the
     error names `source`, by default the folder."""
-    source = source or folder
-    try:
+    check_folder(folder, source=source)
+    with writing(source or folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError) as error:
-        what = "is a file" if source == folder else "cannot be written: its folder is a file"
-        raise InputError(source, "", what) from error
-    except (OSError, ValueError) as error:
-        raise InputError(source, "", f"cannot be written: {_reason(error)}") from error
 
 
 def check_file(path: str | Path) -> None:
     """Raises InputError if `path` cannot be written as a file."""
     _check_name(path)
     _check_no_other(path)
-    check_folder(Path(path).parent)
+    check_folder(Path(path).parent, source=path)
 
 
 def _check_name(path: str | Path) -> None:
@@ -131,18 +126,19 @@ def _check_no_other(path: str | Path) -> None:
         raise InputError(path, "", f"is a {what}, expected a file to write")
 
 
-def check_folder(folder: str | Path) -> None:
-    """Raises InputError if `folder` is no writable folder and cannot be made."""
-    folder = Path(folder)
+def check_folder(folder: str | Path, *, source: str | Path | None = None) -> None:
+    """Raises InputError if `folder` is no writable folder and cannot be made. The error names
+    `source`, by default the folder."""
+    folder, source = Path(folder), source or folder
     _check_name(folder)
     existing = folder
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
     if not existing.is_dir():
-        what = "is a file" if existing == folder else f"'{existing}' is a file"
-        raise InputError(folder, "", f"{what}, expected a folder to write to")
+        what = "is a file" if existing == source else f"'{existing}' is a file"
+        raise InputError(source, "", f"{what}, expected a folder to write to")
     if not os.access(existing, os.W_OK | os.X_OK):
-        raise InputError(folder, "", f"'{existing}' is not writable")
+        raise InputError(source, "", f"'{existing}' is not writable")
 
 
 def _reason(error: Exception) -> str:

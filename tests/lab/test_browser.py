@@ -13,7 +13,7 @@ from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
-from tetra_drake.visualization.replay import save_replay
+from tetra_drake.visualization.replay import Replay
 
 pytestmark = pytest.mark.slow
 
@@ -32,7 +32,7 @@ def trajectory(data):
 @pytest.fixture(scope="module")
 def replay(trajectory, tmp_path_factory):
     path = tmp_path_factory.mktemp("replay") / "replay.html"
-    save_replay(path, robot=ROBOT, trajectory=trajectory, title="a gait: walks 1.0 in")
+    Replay(ROBOT, trajectory, "a gait: walks 1.0 in").save(path)
     return path
 
 

@@ -15,7 +15,6 @@ from tetra_drake.report.result_folder import (
     load_or_simulate,
     load_result,
     save_result_folder,
-    write_replay,
 )
 from tetra_drake.results.result import headline
 from tetra_drake.robot.gait_file import load_gait
@@ -35,8 +34,6 @@ def test_sources_without_motion_and_bad_places_are_refused(tmp_path, folder, run
     for source in (folder, run):  # they have scenarios of their own
         with refused("replay", "scenario", ""):
             load_or_simulate(source, scenario="thesis")
-    with refused(folder, "", ""):
-        write_replay(folder, folder)
     with refused(run, "", ""):  # a result's scenario.yaml would replace the run's
         check_result_folder(run)
 

@@ -1,6 +1,5 @@
 """The replay page: what it shows is the recording, and it needs nothing but itself."""
 
-import functools
 import html
 import json
 import re
@@ -23,10 +22,10 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH, POUND_FORCE
 from tetra_drake.visualization.replay import (
     RESOLUTION,
+    Replay,
     frame_samples,
     ground_forces,
     pack_page,
-    save_replay,
 )
 from tetra_drake.visualization.scene import COLOURS, THICKEST, THINNEST, cable_paths, drawn_radii
 
@@ -64,7 +63,7 @@ def frames(trajectory):
 @pytest.fixture(scope="module")
 def file(scenario, trajectory, tmp_path_factory):
     path = tmp_path_factory.mktemp("replay") / "new" / "replay.html"
-    save_replay(path, robot=Robot.of(scenario), trajectory=trajectory, title=TITLE)
+    Replay(Robot.of(scenario), trajectory, TITLE).save(path)
     return path
 
 
@@ -168,7 +167,7 @@ def test_progress_is_the_distance_or_the_turn(scenario, trajectory, tmp_path, fi
     quarter = trajectory.copy(deep=True)
     quarter["q_WB"].values[:] = [1.0, 0.0, 0.0, 0.0]
     quarter["q_WB"].values[len(quarter.time) // 2 :] = np.sqrt([0.5, 0.0, 0.0, 0.5])
-    save_replay(tmp_path / "turn.html", robot=Robot.of(turning), trajectory=quarter, title="a: b")
+    Replay(Robot.of(turning), quarter, "a: b").save(tmp_path / "turn.html")
     progress = film_of(read_page(tmp_path / "turn.html"))["progress"]
     assert (progress["what"], progress["unit"], progress["values"][-1]) == ("turned", "°", 90.0)
 
@@ -178,7 +177,7 @@ def test_rear_feet_or_the_centre_leave_a_path(structure, frames, film, tmp_path)
     np.testing.assert_allclose(film["traces"], feet, rtol=0, atol=ROUNDING)
     robot = prism.make_prism()
     motion = prism.slide_prism(robot, duration=0.2)
-    save_replay(tmp_path / "prism.html", robot=robot, trajectory=motion, title="a prism")
+    Replay(robot, motion, "a prism").save(tmp_path / "prism.html")
     sliding = film_of(read_page(tmp_path / "prism.html"))
     assert not sliding["named"]  # bodies named after two nodes
     ends = [[0.0, 0.0, 0.08], [0.2 * prism.SPEED, 0.0, 0.08]]
@@ -196,7 +195,7 @@ def test_the_title_is_text_and_not_markup(page, trajectory):
 def test_pages_share_one_version_of_a_viewer(scenario, trajectory, page, tmp_path, refused):
     viewer, path = tmp_path / "shared" / "viewer #1.js", tmp_path / "runs" / "a" / "replay.html"
     robot = Robot.of(scenario)
-    save = functools.partial(save_replay, robot=robot, trajectory=trajectory, title=TITLE)
+    save = Replay(robot, trajectory, TITLE).save
     save(path, viewer=viewer)
     script = viewer.read_text(encoding="utf-8")
     shared = read_page(path)
@@ -214,7 +213,7 @@ def test_pages_share_one_version_of_a_viewer(scenario, trajectory, page, tmp_pat
 def test_a_page_without_ground_shows_anchors_and_no_floor(tmp_path):
     hung = scenario_of(HUNG, duration=0.05)
     robot, frames = Robot.of(hung), recorded(hung)
-    save_replay(tmp_path / "page.html", robot=robot, trajectory=frames, title="a robot: hangs")
+    Replay(robot, frames, "a robot: hangs").save(tmp_path / "page.html")
     page = read_page(tmp_path / "page.html")
     film = film_of(page)
     colours = {node["path"][-1]: (node["body"], node["colour"]) for node in film["nodes"]}

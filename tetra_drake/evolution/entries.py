@@ -158,26 +158,27 @@ class IterationLine(Line):
     mean_fitness: float | None = None
 
 
-class EliteLine(Line):
-    """Line of a record for one elite, simulated on disturbed robots. An elite is the fittest gait
-    in a cell of the map that !QualityDiversity fills; see lab.elites.elites."""
+class GaitLine(Line):
+    """Line of a record for one gait of any trial."""
 
     identity = ("trial", "index")
 
     trial: WholeNumber
     index: WholeNumber
+
+
+class EliteLine(GaitLine):
+    """Line of a record for one elite, simulated on disturbed robots. An elite is the fittest gait
+    in a cell of the map that !QualityDiversity fills; see lab.elites.elites."""
+
     kept: Annotated[float, Field(ge=0, le=1)]
     mean_distance: float | None
 
 
-class SpreadLine(Line):
+class SpreadLine(GaitLine):
     """Line of a record with the least and greatest values of a gait's metrics for moved starts; see
     lab.spread."""
 
-    identity = ("trial", "index")
-
-    trial: WholeNumber
-    index: WholeNumber
     spread: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]]
 
 
@@ -225,7 +226,7 @@ class RecordFile:
         to another run or trial.
         """
         kind, is_counted = LINES[self.path.name], self.path.name in _COUNTED
-        entries = itertools.chain(_entries(compressed(self.path)), _entries(self.path))
+        entries = itertools.chain(entries_of(compressed(self.path)), entries_of(self.path))
         seen = set()
         for row, entry in enumerate(entries):
             for key, ours in self.owner.items():
@@ -287,7 +288,7 @@ def json_line(entry: Mapping[str, Any]) -> str:
     return f'{text}, "crc": "{zlib.crc32(text.encode()):08x}"}}\n'
 
 
-def _entries(path: Path) -> Iterator[dict[str, Any]]:
+def entries_of(path: Path) -> Iterator[dict[str, Any]]:
     """The JSON objects of a file's lines, without their checksums; none if there is no file.
 
     An incomplete last line, which a kill leaves, is left out. Raises InputError for any other

@@ -109,7 +109,7 @@ def _structure(
     """
     from tetra_drake.engines.mjcf import loose_remark, make_mjcf
     from tetra_drake.lab.bridges.conversion import converted
-    from tetra_drake.lab.bridges.formats import foreign_format, save_structure
+    from tetra_drake.lab.bridges.formats import format_of, save_structure
     from tetra_drake.lab.bridges.sdf import make_sdf
     from tetra_drake.lab.study.equilibrium import (
         robot_of_file,
@@ -123,7 +123,7 @@ def _structure(
     if mode is not None and (out is None or out.suffix in (".yaml", ".yml")):
         raise InputError("structure", "--mode", "needs --out, a page")
     structure = None
-    if foreign_format(source) or without:
+    if without or format_of(source) in ("MuJoCo", "NTRT"):
         structure = converted(Path(source), unit=unit, without=without or ())
     if out and out.suffix in (".yaml", ".yml"):
         structure = structure or read_structure(source, unit=unit)
@@ -342,15 +342,14 @@ def _predict(
 
     Example: tetra-drake predict my.yaml --quantities 'n3 z' --out out
     """
-    from tetra_drake.lab.bridges.formats import names_scenario
+    from tetra_drake.lab.bridges.formats import format_of
     from tetra_drake.lab.predict.predict import predict
     from tetra_drake.lab.study.equilibrium import robot_of_file
     from tetra_drake.robot.command_file import load_command
     from tetra_drake.scenario.load import load_scenario
-    from tetra_drake.scenario.scenario import scenario_of
 
-    is_scenario = names_scenario(source)
-    scenario = load_scenario(source) if is_scenario else scenario_of(robot_of_file(source).scenario)
+    is_scenario = format_of(source) == "scenario"
+    scenario = load_scenario(source) if is_scenario else robot_of_file(source).scenario
     played = None if command is None else load_command(command, scenario)
     if quantities is None:
         groups = dict.fromkeys(scenario.robot.blueprint().cable_groups)

@@ -26,7 +26,6 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_source
 from tetra_drake.files import (
-    check_file,
     check_folder,
     given_path,
     json_number,
@@ -256,26 +255,3 @@ def load_or_simulate(
     loaded = load_source(source, scenario=scenario, warn=warn)
     result = simulate(loaded.scenario, loaded.best, record=True)
     return dataclasses.replace(result, spread=loaded.spread)
-
-
-def write_replay(
-    source: Path, out: Path, *, scenario: str | None = None, warn: Say = silent
-) -> str:
-    """Writes the replay page of a result folder, a gait file or a run. Returns the page's title.
-
-    Args:
-        source: the result folder, gait file or folder of a run.
-        out: the page to write.
-        scenario: name or file of the scenario for a gait file. By default the scenario of the run
-            that contains the file, or "thesis".
-        warn: function that gets a warning if the gait was made for another scenario.
-
-    Raises:
-        InputError: if the page cannot be written (nothing is simulated then), or the source cannot
-            be used.
-        SimulationFailure: if the simulation of a gait fails.
-    """
-    check_file(out)
-    result = load_or_simulate(source, scenario=scenario, warn=warn)
-    result.save_replay(out)
-    return result.title

@@ -37,12 +37,14 @@ from tetra_drake.scenario.metrics import (
     has_rolled,
     headline_metric,
 )
-from tetra_drake.scenario.scenario import Scenario, scenario_of
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.world import SimulationSection
 from tetra_drake.settings.section import Section
 
 if TYPE_CHECKING:
     import xarray
+
+    from tetra_drake.visualization.replay import Replay
 
 
 class IntegratorWork(Section):
@@ -131,18 +133,18 @@ class SimulationResult:
 
     def replay_page(self) -> str:
         """The HTML page that save_replay() writes."""
-        from tetra_drake.visualization.replay import replay_page
-
-        return replay_page(robot=self.robot, trajectory=self.trajectory, title=self.title)[0]
+        return self._replay.page()[0]
 
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
         """Writes an HTML page that plays the motion to the file `path`. For `viewer`, see
-        visualization.replay.save_replay(). Raises InputError if no trajectory was recorded."""
-        from tetra_drake.visualization.replay import save_replay
+        visualization.replay.Replay.save(). Raises InputError if no trajectory was recorded."""
+        self._replay.save(path, viewer=viewer)
 
-        save_replay(
-            path, robot=self.robot, trajectory=self.trajectory, title=self.title, viewer=viewer
-        )
+    @property
+    def _replay(self) -> Replay:
+        from tetra_drake.visualization.replay import Replay
+
+        return Replay(self.robot, self.trajectory, self.title)
 
     def save_video(
         self,
@@ -204,7 +206,7 @@ def make_result(
         wall_time: wall time of the integration in s.
         record: whether the result has a trajectory.
     """
-    robot, scenario = driven.robot, scenario_of(driven.robot.scenario)
+    robot, scenario = driven.robot, driven.robot.scenario
     simulation, structure = robot.scenario.simulation, robot.structure
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)

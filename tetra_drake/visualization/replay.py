@@ -10,6 +10,7 @@ import math
 import os
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -26,7 +27,6 @@ from tetra_drake.robot.measures import distance_walked, path_of_centre
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
 from tetra_drake.scenario.metrics import looks_for_turns
-from tetra_drake.scenario.scenario import scenario_of
 from tetra_drake.visualization.scene import (
     COLOURS,
     add_robot,
@@ -70,106 +70,81 @@ _USUAL = 99.0
 """Percentile of tensions and forces that is drawn at full size. Impacts are far larger."""
 
 
-def save_replay(
-    path: str | Path,
-    *,
-    robot: Robot,
-    trajectory: xarray.Dataset,
-    title: str,
-    viewer: str | Path | None = None,
-    progress: Mapping[str, Any] | None = None,
-    text: str = "",
-) -> None:
-    """Writes a page that replays a trajectory.
+@dataclass(frozen=True)
+class Replay:
+    """Page that replays a trajectory. Every frame is a sample of the trajectory; the page
+    interpolates between frames."""
 
-    Every frame is a sample of the trajectory; the page interpolates between frames.
+    robot: Robot
+    """The robot that moved."""
+    trajectory: xarray.Dataset
+    """Its motion and forces over time; see results.trajectory."""
+    title: str
+    """Name of the gait, a colon, and a short result, such as "walks 14 in". If the result begins
+    with "rolls", the page says "rolled", otherwise "walked"."""
+    progress: Mapping[str, Any] | None = None
+    """What the page writes at each frame in place of the distance, see _progress(). Then no path is
+    drawn."""
+    text: str = ""
+    """Text with numbers, which the page shows on demand."""
 
-    Args:
-        path: the HTML file to write.
-        robot: the robot that moved.
-        trajectory: its motion and forces over time; see results.trajectory.
-        title: name of the gait, a colon, and a short result, such as "walks 14 in". If the
-            result begins with "rolls", the page says "rolled", otherwise "walked".
-        viewer: file for Meshcat's script. Pages can share it, which makes them much smaller. It is
-            written if it does not exist. By default the script is in the page.
-        progress: what the page writes at each frame in place of the distance, see _progress(). Then
-            no path is drawn.
-        text: text with numbers, which the page shows on demand.
+    def save(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
+        """Writes the page to the HTML file `path`.
 
-    Raises:
-        InputError: if a file cannot be written, or `viewer` has another content.
-    """
-    address = ""
-    if viewer is not None:
-        address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
-    page, script = replay_page(
-        robot=robot,
-        trajectory=trajectory,
-        title=title,
-        address=address,
-        progress=progress,
-        text=text,
-    )
-    if viewer is not None:
-        file = Path(viewer)
-        if not file.exists():
-            write_whole(file, script)
-        elif not file.is_file() or file.read_bytes() != script.encode("utf-8"):
-            problem = "is not the viewer of this version of Drake; delete it or name another file"
-            raise InputError(file, "", problem)
-    write_whole(path, page)
+        `viewer` is a file for Meshcat's script. Pages can share it, which makes them much smaller.
+        It is written if it does not exist. By default the script is in the page. Raises InputError
+        if a file cannot be written, or `viewer` has another content.
+        """
+        address = ""
+        if viewer is not None:
+            address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
+        page, script = self.page(address)
+        if viewer is not None:
+            file = Path(viewer)
+            if not file.exists():
+                write_whole(file, script)
+            elif not file.is_file() or file.read_bytes() != script.encode("utf-8"):
+                problem = "is no viewer of this version of Drake; delete it or name another file"
+                raise InputError(file, "", problem)
+        write_whole(path, page)
 
+    def page(self, address: str = "") -> tuple[str, str]:
+        """The page as HTML, and the script for the file at `address`; "" if there is no address.
 
-def replay_page(
-    *,
-    robot: Robot,
-    trajectory: xarray.Dataset,
-    title: str,
-    address: str = "",
-    progress: Mapping[str, Any] | None = None,
-    text: str = "",
-) -> tuple[str, str]:
-    """Makes a page that replays a trajectory.
-
-    Args:
-        robot, trajectory, title, progress, text: see save_replay().
-        address: URL from which the page reads Meshcat's script (JavaScript), relative to the page.
-            By default the script is in the page itself.
-
-    Returns:
-        The page as HTML, and the script for the file at `address`; "" if there is no address.
-    """
-    meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
-    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
-    p_WN = trajectory["p_WN"].values
-    add_robot(meshcat, robot.structure)
-    set_surroundings(meshcat, robot, p_WN, seen=p_WN[0])
-    page, script = meshcat.StaticHtml(), ""
-    if address:
-        before, script, after = _SCRIPT.split(page, maxsplit=1)
-        reader = render("visualization/viewer.html.jinja", address=address)
-        # Before the body, so that nothing of the body is shown if the file is missing.
-        page = (before + after).replace("</head>", f"{reader}</head>", 1)
-    name, _, deed = title.rpartition(": ")
-    film = film_of(robot, frames, rolls=deed.startswith("rolls"))
-    if progress is not None:
-        film |= {"progress": progress, "traces": []}
-    overlay = render(
-        "visualization/overlay.html.jinja",
-        name=name,
-        deed=deed,
-        text=text,
-        film=film,
-        script=render("visualization/film.js"),
-    )
-    page = _COMMAND.sub(r"handle(\1);", page)
-    # The replacements are functions, because backslashes in a text would be interpreted.
-    named = f"<title>{html.escape(title)}</title>{_IN_HEAD}"
-    page = page.replace("<html>", '<html lang="en">', 1)
-    page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
-    page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
-    page = "</main></body>".join(page.rsplit("</body>", 1))
-    return pack_page(page, title=title), script
+        `address` is the URL from which the page reads Meshcat's script (JavaScript), relative to
+        the page. By default the script is in the page itself.
+        """
+        meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
+        frames = self.trajectory.isel(time=frame_samples(self.trajectory["time"].values))
+        p_WN = self.trajectory["p_WN"].values
+        add_robot(meshcat, self.robot.structure)
+        set_surroundings(meshcat, self.robot, p_WN, seen=p_WN[0])
+        page, script = meshcat.StaticHtml(), ""
+        if address:
+            before, script, after = _SCRIPT.split(page, maxsplit=1)
+            reader = render("visualization/viewer.html.jinja", address=address)
+            # Before the body, so that nothing of the body is shown if the file is missing.
+            page = (before + after).replace("</head>", f"{reader}</head>", 1)
+        name, _, deed = self.title.rpartition(": ")
+        film = film_of(self.robot, frames, rolls=deed.startswith("rolls"))
+        if self.progress is not None:
+            film |= {"progress": self.progress, "traces": []}
+        overlay = render(
+            "visualization/overlay.html.jinja",
+            name=name,
+            deed=deed,
+            text=self.text,
+            film=film,
+            script=render("visualization/film.js"),
+        )
+        page = _COMMAND.sub(r"handle(\1);", page)
+        # The replacements are functions, because backslashes in a text would be interpreted.
+        named = f"<title>{html.escape(self.title)}</title>{_IN_HEAD}"
+        page = page.replace("<html>", '<html lang="en">', 1)
+        page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
+        page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
+        page = "</main></body>".join(page.rsplit("</body>", 1))
+        return pack_page(page, title=self.title), script
 
 
 def film_of(robot: Robot, frames: xarray.Dataset, *, rolls: bool) -> dict[str, Any]:
@@ -252,7 +227,7 @@ def _progress(robot: Robot, frames: xarray.Dataset, *, rolls: bool) -> dict[str,
     """What the page writes at each frame: the distance walked in the scenario's unit of length, or
     the change of heading in degrees if the objective is about turning. Keys: `what` (a verb),
     `unit`, `digits` (decimals) and `values` (frames,)."""
-    structure, objective = robot.structure, scenario_of(robot.scenario).objective
+    structure, objective = robot.structure, robot.scenario.objective
     if structure.points_ahead and looks_for_turns(objective):
         heading = np.rad2deg(path_of_centre(frames, structure).heading)
         values, what, unit, digits = heading - heading[0], "turned", "°", 0

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from tetra_drake.errors import InputError
-from tetra_drake.lab.bridges.formats import foreign_format
+from tetra_drake.lab.bridges.formats import format_of
 from tetra_drake.lab.bridges.mjcf import mjcf_tree
 from tetra_drake.lab.bridges.ntrt import ntrt_tree
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -27,7 +27,7 @@ def converted(
     Raises:
         InputError: names file and key.
     """
-    if foreign_format(file) == "MuJoCo":
+    if format_of(file) == "MuJoCo":
         content = mjcf_tree(file, without=without)
         if unit is not None:
             content["unit"] = unit

@@ -67,7 +67,7 @@ def make_video(
     """Writes a video of a replay page: an MP4 or a GIF, by the suffix of `path`.
 
     Args:
-        replay: the page as HTML, see replay.replay_page().
+        replay: the page as HTML, see replay.Replay.page().
         path: the file to write.
         size: width and height in pixels; both are even.
         fps: frames per second.

@@ -14,7 +14,8 @@ import numpy as np
 import pandas
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_bytes, write_whole
+from tetra_drake.evolution.entries import entries_of, json_line
+from tetra_drake.files import json_number, write_whole
 from tetra_drake.formatting import Say
 from tetra_drake.lab.fit.measurements import Measured, Prediction
 from tetra_drake.lab.predict.variates import variates_of
@@ -29,11 +30,9 @@ STEP = 1e-3
 the tolerance of the simulation show; with more, the curvature."""
 HUGE = 1e200
 """Sum of squares where a simulation fails."""
-SEAL = 32
-"""Size of the digest in the file of an evaluation, in bytes."""
 KEPT_EVALUATIONS = "evaluations"
-"""Name of the folder that keeps the evaluations of a fit. A file has a digest of its name and
-numbers, then the numbers: the predicted ones of all measurements."""
+"""Name of the folder that keeps the evaluations of a fit. A file has a line with a checksum, as the
+record of a run: the file's name, and the predicted numbers of all measurements."""
 
 Bounds = Sequence[str | float]
 
@@ -221,13 +220,13 @@ class FitProblem:
         folder, or simulates. Known points are skipped."""
         unknown = {self._name(point): point for point in points}
         unknown = {name: each for name, each in unknown.items() if name not in self._known}
-        files = {name: self._kept / f"{name}.bin" for name in unknown} if self._kept else {}
+        files = {name: self._kept / f"{name}.jsonl" for name in unknown} if self._kept else {}
         for name, file in files.items():
             with contextlib.suppress(InputError):  # a missing or damaged evaluation is made again
-                content = read_bytes(file, "evaluation")
-                if content[:SEAL] == _seal(name, content[SEAL:]):
-                    self._known[name] = np.frombuffer(content[SEAL:])
-                    del unknown[name]
+                for entry in entries_of(file):
+                    if entry["name"] == name:
+                        self._known[name] = np.array(entry["numbers"], dtype=float)
+                        del unknown[name]
         if not unknown:
             return
         scenarios = [self.scenario_at(point) for point in unknown.values()]
@@ -236,7 +235,8 @@ class FitProblem:
             numbers = np.concatenate([each.values for each in predictions])
             self._known[name] = numbers
             if name in files:
-                write_whole(files[name], _seal(name, numbers.tobytes()) + numbers.tobytes())
+                listed = [json_number(number) for number in numbers.tolist()]
+                write_whole(files[name], json_line({"name": name, "numbers": listed}))
 
     def _name(self, x: np.ndarray) -> str:
         """Name of the evaluation of a point, and of its file: a hexadecimal digest of the data, and
@@ -244,9 +244,3 @@ class FitProblem:
         keys = [parameter.key for parameter in self.parameters]
         text = f"{self.digest} {keys} {(x * self.scale).tolist()}"
         return hashlib.sha256(text.encode()).hexdigest()[:24]
-
-
-def _seal(name: str, content: bytes) -> bytes:
-    """Digest (SHA-256, 32 bytes) of the name and the content of an evaluation's file, by which a
-    damaged file is found."""
-    return hashlib.sha256(name.encode() + content).digest()

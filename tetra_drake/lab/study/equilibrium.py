@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
-from tetra_drake.lab.bridges.formats import names_scenario
+from tetra_drake.lab.bridges.formats import format_of
 from tetra_drake.lab.study.statics import Statics, find_statics
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.cable import TENSION
@@ -49,7 +49,7 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.settings.refusals import no_such
-from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
+from tetra_drake.visualization.replay import FRAMES_PER_SECOND, Replay
 
 _LARGE = 50
 """Number of bodies from which modes are not computed."""
@@ -147,9 +147,10 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     Raises:
         InputError: if the robot has no equilibrium.
     """
+    is_file = isinstance(given, (str, Path)) and os.path.isfile(given)
     if isinstance(given, Robot):
         robot = given
-    elif isinstance(given, (str, Path)) and os.path.isfile(given) and not names_scenario(given):
+    elif is_file and format_of(str(given)) != "scenario":
         robot = robot_of_file(str(given))
     else:
         robot = Robot.of(given_scenario(given))
@@ -200,7 +201,7 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     if name_or_file not in known and not os.path.exists(name_or_file):
         problem = no_such("structure or scenario", name_or_file, known)
         raise InputError(name_or_file, "", problem)
-    if not names_scenario(name_or_file):
+    if format_of(name_or_file) != "scenario":
         return robot_of_structure(read_structure(name_or_file, unit=unit), name_or_file)
     given = load_scenario(name_or_file)
     ground = Flat() if given.terrain.is_ground else given.terrain
@@ -356,14 +357,8 @@ def save_structure_page(study: EquilibriumStudy, path: Path, *, mode: int | None
         trajectory[name][:] = trajectory[name].values[-1]
     frames = frequencies.repeat(_SWING)
     shown = {"what": "mode at", "unit": " Hz", "digits": 2, "values": [*frames, *frames[-1:]]}
-    save_replay(
-        path,
-        robot=robot,
-        trajectory=trajectory,
-        title=title,
-        progress=shown if frames.size else None,
-        text=structure_text(study),
-    )
+    progress = shown if frames.size else None
+    Replay(robot, trajectory, title, progress, text=structure_text(study)).save(path)
 
 
 def _shown_modes(study: EquilibriumStudy, mode: int | None) -> tuple[str, np.ndarray, np.ndarray]:
