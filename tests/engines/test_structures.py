@@ -121,6 +121,8 @@ def test_a_structure_walks_as_far_as_its_centre_of_mass():
     way = result.trajectory.p_WB[-1] - result.trajectory.p_WB[0]
     mass = Robot.of(heavy).structure.mass
     x, y, _ = mass @ way.values / mass.sum()
+    start, *_, end = result.path.centre
+    assert end - start == pytest.approx(mass @ way.values / mass.sum(), abs=1e-9)
     assert result.metrics.distance == pytest.approx(x, abs=1e-9)
     assert result.metrics.lateral_drift == pytest.approx(abs(y), abs=1e-9)
     assert abs(float(way.mean("body")[0]) - x) > 1e-4, "the mean of the bodies goes another way"
