@@ -141,11 +141,10 @@ def speed_of(walk: Outcome) -> Row:
 
 def place_of(walk: Outcome) -> Row:
     """Shares of time in the air and change of heading (rad) of a walk, for its record."""
-    shares, turn = [0.0] * 5, 0.0
-    if isinstance(walk, SimulationResult):
-        shares, turn = walk.metrics.lifted_shares, walk.metrics.heading_change
-    shares = [round(share, DECIMALS) for share in shares]
-    return {"lifted_shares": shares, "heading_change": round(turn, DECIMALS)}
+    if not isinstance(walk, SimulationResult):
+        return {"lifted_shares": [0.0] * 5, "heading_change": 0.0}
+    shares = [round(share, DECIMALS) for share in walk.metrics.lifted_shares]
+    return {"lifted_shares": shares, "heading_change": round(walk.metrics.heading_change, DECIMALS)}
 
 
 # Trial and error

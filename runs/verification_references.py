@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import CodeType
 from typing import Any
 
@@ -86,7 +86,7 @@ def four_bar_tree(windows: int, rod: Case) -> dict[str, Any]:
     cranks = {f"a{i} b{i}": spin for i in range(windows + 1)}
     return {
         "nodes": nodes,
-        "struts": {"rod": rod | {"pairs": pairs}},
+        "struts": {"rod": {**rod, "pairs": pairs}},
         "pinned": [f"b{i}" for i in range(windows + 1)],
         "anchors": {"w": "xyz"} | {f"a{i}": "xyz" for i in range(windows + 1)},
         "start": {"rest": False, "velocity": ["1 m/s", 0, 0], "bodies": cranks},
@@ -158,7 +158,7 @@ def disk_tree(count: int, disk: Case) -> dict[str, Any]:
     """A disk of 0.1 m as a ring of nodes."""
     angles = 2.0 * np.pi * np.arange(count) / count - 0.5 * np.pi
     nodes = {f"r{i}": [0.1 * math.cos(a), 0.1 * math.sin(a), 0] for i, a in enumerate(angles)}
-    body = disk | {"nodes": [*nodes], "centre": [0, 0, 0]}
+    body = {**disk, "nodes": [*nodes], "centre": [0, 0, 0]}
     return {"nodes": nodes | {"w": [0, 9, 0]}, "bodies": {"disk": body}, "contacts": [*nodes]}
 
 
@@ -184,7 +184,7 @@ def beads_tree(places: Sequence[Sequence[float]], count: int, law: Case) -> dict
     return {
         "nodes": nodes,
         "masses": {f"b{i}": "10 g" for i in range(1, count + 1)},
-        "cables": {"link": law | {"pairs": [list(pair) for pair in itertools.pairwise(nodes)]}},
+        "cables": {"link": {**law, "pairs": [list(pair) for pair in itertools.pairwise(nodes)]}},
     }
 
 
@@ -253,7 +253,7 @@ def prism_of(count: int, twist: float, density: float, stiffness: float) -> Equi
     for name, (length, own) in sizes.items():
         free = f"{length * (1.0 - own / stiffness)!r} m"
         cables[name] = k | {"pairs": pairs[name], "free_length": free}
-    bar = {"diameter": "4 mm", "density": "1200 kg/m^3", "node_diameter": "0 m"}
+    bar: dict[str, Any] = {"diameter": "4 mm", "density": "1200 kg/m^3", "node_diameter": "0 m"}
     bar |= {"contact_radius": "0 m", "pairs": [[f"a{i}", f"b{j}"] for i, j in ring]}
     return at_rest(nodes=nodes, struts={"bar": bar}, cables=cables)
 
