@@ -145,14 +145,6 @@ def test_a_tension_and_a_frequency_give_mass_and_stiffness():
     assert found.residuals["uncertainty"].unique().tolist() == [1.0, 0.05]
 
 
-def test_joined_keys_get_the_same_value():
-    scenario = hung().with_changes({"robot.masses.b": "0.2 kg"})
-    weight = (Robot.of(scenario).structure.mass.sum() + 2.0 * 0.1) * scenario.robot.gravity
-    found = fit(scenario, [Rest(tensions={"line top a": weight})], {MASSES: (0.1, 0.5)})
-    assert found.parameters["value"].to_dict() == pytest.approx({MASSES: 0.3}, rel=1e-5)
-    assert found.scenario.robot.masses == dict.fromkeys("ab", found.parameters["value"][MASSES])
-
-
 @pytest.fixture
 def add_waves(monkeypatch, by_formula):
     """add_waves(height, number): adds a wave over the stiffness, 0 at 310 N/m, to predictions."""
