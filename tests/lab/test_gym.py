@@ -97,6 +97,18 @@ def test_the_rewards_of_an_episode_are_the_fitness(short, objective):
     assert (dense.size > 5) == (objective != "cost_of_transport")
 
 
+def test_each_reward_for_rolling_is_the_angle_rolled_since_the_last(short):
+    rolling = short.with_sections(objective={"rolled": 2.0})
+    rewards, rolled = episode(TensegrityEnv(rolling), seed=3)[1], [0.0]
+    for time in (0.1, 0.12, 0.14):
+        env = TensegrityEnv(rolling.with_changes({"simulation.duration": f"{time} s"}))
+        episode(env, seed=3)
+        rolled.append(env.result().metrics.rolled)
+    sums = np.diff([0.0, *np.cumsum(rewards)[[4, 5, 6]]])
+    assert sums == pytest.approx(2.0 * np.diff(rolled), rel=1e-9)
+    assert np.abs(rewards).min() > 0.0
+
+
 def test_a_robot_that_fails_ends_its_episode_with_nothing(short):
     env = TensegrityEnv(short.with_changes({"cpg.gain": "4e9 N"}))
     _, rewards, terminated, truncated = episode(env, seed=0)

@@ -366,9 +366,9 @@ def _AddSignals(
 
 
 def MakeSignalSource(samples: np.ndarray, *, step: float) -> Diagram:
-    """Source of signals that are known beforehand, such as those of a command. Its output port
-    `signals` (m,) in N is linear between the `samples` (k, m) at multiples of `step` (s), and holds
-    the last ones."""
+    """Source of signals that are known beforehand, such as the signals of a command. Its output
+    port `signals` (m,) in N is linear between the `samples` (k, m) at multiples of `step` (s), and
+    holds the last ones."""
     bends = 1 + np.flatnonzero(np.diff(samples, 2, axis=0).any(axis=1))
     kept = np.array([0, *bends, len(samples) - 1])  # a command holds its signals for many steps
     signals = PiecewisePolynomial.FirstOrderHold(step * kept, samples[kept].T)
