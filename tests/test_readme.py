@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.brief import BRIEF
 from record import EXPERIMENTS
 
 import tetra_drake as td
@@ -30,16 +31,6 @@ MANUAL = [page for folder in FOLDERS for page in sorted((CHECKOUT / folder).rglo
 def text_of(page: str) -> str:
     """A page of the package, by its place there, without .md."""
     return (CHECKOUT / "tetra_drake" / f"{page}.md").read_text(encoding="utf-8")
-
-
-QUICK = """\
-base: thesis
-name: quick
-simulation: {duration: 0.4 s, steady_from: 0.1 s}
-evolution: {trials: 1, evaluations: 6}
-optimizer: {population: 4, tournament: 2}
-"""
-"""Takes the place of the shipped scenario of this name."""
 
 
 def snippets(language: str, page: str = README) -> list[str]:
@@ -90,7 +81,7 @@ def test_the_files_of_other_kinds_are_read(work: Path) -> None:
 
 @pytest.mark.slow
 def test_the_commands_run(work: Path) -> None:
-    (work / "short.yaml").write_text(QUICK)
+    (work / "short.yaml").write_text(td.load_scenario("quick").with_changes(BRIEF).to_yaml())
     for arguments in commands(README):
         # Shorter simulations of the same kind; the rest is as it stands.
         short = ["--scenario", "short.yaml"] if arguments[0] in ("simulate", "evolve") else []
@@ -112,7 +103,7 @@ def change_all(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     return change
 
 
-BRIEF = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
+SECOND = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
 
 
 def ran(snippet: str) -> dict[str, Any]:
@@ -123,7 +114,7 @@ def ran(snippet: str) -> dict[str, Any]:
 
 
 def test_the_python_runs(work: Path, change_all, monkeypatch: pytest.MonkeyPatch) -> None:
-    change_all(BRIEF)
+    change_all(SECOND)
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
     page = (CHECKOUT / "diagrams/tasks.md").read_text(encoding="utf-8")
     ran(*snippets("python", page))
@@ -155,7 +146,7 @@ def test_libraries_find_gaits(library: str, number: int, change_all) -> None:
 
 
 def test_the_steering_runs_as_a_function_and_by_the_port(change_all) -> None:
-    change_all(BRIEF)
+    change_all(SECOND)
     names = ran(snippets("python", text_of("scenario/signals"))[0])
     assert names["result"].duration == names["simulator"].get_context().get_time() == 1.0
     steering = names["diagram"].GetSubsystemByName("steering")

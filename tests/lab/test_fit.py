@@ -4,6 +4,7 @@ import functools
 import json
 import math
 import re
+import shutil
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -378,17 +379,9 @@ def test_where_a_number_is_far_off_there_is_no_interval_and_it_is_named(by_formu
     assert "a z of measurement 3" in found.warnings[0]
 
 
-FIT_FILE = """
-parameters:
-  robot.cables.line.stiffness: [100 N/m, 0.4 kN/m]
-measurements:
-- !Rest {positions: {a z: 583 mm}, position_uncertainty: 0.2 mm}
-"""
-
-
 def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_path, capsys):
     save_scenario(tmp_path, hung())
-    (tmp_path / "fit.yaml").write_text(FIT_FILE)
+    shutil.copy(Path(__file__).with_name("fit.yaml"), tmp_path)
     out = tmp_path / "fit"
     assert main(["fit", str(tmp_path / "fit.yaml"), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
