@@ -132,17 +132,19 @@ def test_a_parameter_without_influence_is_told_and_stays(by_formula):
     assert (len(found.warnings), len(alone.warnings)) == (1, 2) and alone.misfit > 100.0
 
 
-def test_a_tension_and_a_frequency_give_mass_and_stiffness():
-    scenario = hung()
-    mass, stiffness = Robot.of(scenario).structure.mass.sum() + 0.1, 230.0
-    bounce = math.sqrt(stiffness / mass) / (2.0 * math.pi)
-    gravity = scenario.robot.gravity
-    robot = Robot.of(scenario.with_changes({"robot.masses.a": "0.3 kg", STIFFNESS: "230 N/m"}))
+def test_a_tension_and_a_frequency_give_two_equal_masses_and_the_stiffness():
+    scenario, stiffness = hung().with_changes({"robot.masses.b": "0.2 kg"}), 230.0
+    mass = Robot.of(scenario).structure.mass.sum() + 2.0 * 0.1
+    changes = {STIFFNESS: "230 N/m", "robot.masses": {"a": "0.3 kg", "b": "0.3 kg"}}
+    robot = Robot.of(scenario.with_changes(changes))
     frequencies = measurements.study_equilibrium(robot).frequencies.tolist()
+    bounce = math.sqrt(stiffness / mass) / (2.0 * math.pi)
     assert min(abs(np.array(frequencies) / bounce - 1.0)) < 1e-8
-    case = Rest(tensions={"line top a": mass * gravity}, frequencies=frequencies)
-    found = fit(scenario, [case], {"robot.masses.a": (0.1, 0.5)} | ALONE)
+    weight = {"line top a": mass * scenario.robot.gravity}
+    case = Rest(tensions=weight, frequencies=frequencies)
+    found = fit(scenario, [case], {MASSES: (0.1, 0.5)} | ALONE)
     assert found.parameters["value"].to_list() == pytest.approx([0.3, stiffness], rel=1e-4)
+    assert found.scenario.robot.masses == dict.fromkeys("ab", found.parameters["value"][MASSES])
     assert found.residuals["uncertainty"].unique().tolist() == [1.0, 0.05]
 
 
