@@ -56,6 +56,14 @@ def run_program(folder, call, *, how):
     return subprocess.run([sys.executable, *source], capture_output=True, timeout=300, **options)
 
 
+@pytest.mark.slow
+def test_a_program_without_guard_is_told(tmp_path):
+    ended = run_program(tmp_path, PROGRAM["evaluate"], how="file")
+    assert ended.returncode == 1 and ended.stdout == ""
+    error = ended.stderr.splitlines()[-1]
+    assert "InputError" in error and "__main__" in error
+
+
 PROGRAMS = [
     (ModuleType("__main__"), "what is defined interactively"),
     (PROGRAM_FROM_STDIN, "'<stdin>' is no file"),

@@ -32,6 +32,7 @@ def test_a_weight_on_a_damped_cable_bounces_as_a_damped_oscillator():
     damped = natural * math.sqrt(1.0 - ratio**2) / (2.0 * math.pi)
     assert modes.frequencies[bounces] == pytest.approx(damped, rel=1e-6)
     assert modes.damping_ratios[bounces] == pytest.approx(ratio, rel=1e-6)
+    assert abs(modes.shapes[bounces, 1, 2].real) == pytest.approx(1.0), "in phase, the farthest"
 
 
 # On the ground the loaded nodes stick, and touch it all the time.
