@@ -93,15 +93,6 @@ def build() -> type[Section]:
 KIND = "from tetra_drake.laws.friction import Coulomb\nclass {}(Coulomb): pass\n"
 
 
-def test_a_kind_of_a_plugin_is_one_of_the_union(site):
-    (site / "sticky.py").write_text(KIND.format("Sticky"))
-    declare(site, "sticky", "2.0", {plugins.KINDS: {"Sticky": "sticky:Sticky"}})
-    friction = build().from_tree({"friction": {TAG: "Sticky", "static": 0.7}}, "mine").friction
-    assert (friction.tag, friction.static) == ("Sticky", 0.7)
-    assert plugins.plugins_of([("friction", friction)]) == {"plug-in sticky": "2.0"}
-    assert plugins.plugins_of([("friction", Coulomb())]) == {}
-
-
 DAMAGED = yaml.safe_load(Path(__file__).with_name("damaged.yaml").read_text("utf-8"))
 
 
