@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,12 +17,10 @@ from typing import Any
 
 import numpy as np
 import pandas
-from script import read_record, run_script
+from script import measured, read_record, run_script
 
-from tetra_drake.engines.simulate import check_scenario, simulate_many
+from tetra_drake.engines.simulate import Outcome, check_scenario, simulate_many
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.evaluators import MakeExecutor, evaluate_all, evaluator_of
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.lab.study.robustness import PERCENT, by_gait, robustness
@@ -31,10 +28,8 @@ from tetra_drake.lab.study.statistics import json_rows
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough
 from tetra_drake.machine import available_cores, versions
-from tetra_drake.optimizers.base import Task
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.metrics import looks_for_turns, unmet_requirements
@@ -144,11 +139,8 @@ def analysis_of(content: Mapping[str, Any]) -> Analysis:
     return Analysis(best.set_index("trial"), resimulations, unseen, disturbed.set_index("gait"))
 
 
-def analyse(directory: Path, *, workers: int, executor: MakeExecutor | None = None) -> None:
-    """Analyses a run's best gaits (see Analysis) and writes analysis.json.
-
-    `executor` is used for all simulations except the draws of disturbances.
-    """
+def analyse(directory: Path, *, workers: int) -> None:
+    """Analyses a run's best gaits (see Analysis) and writes analysis.json."""
     run = load_run(directory)
     scenario = run.scenario
     run.fittest()  # InputError if there is none
@@ -161,7 +153,7 @@ def analyse(directory: Path, *, workers: int, executor: MakeExecutor | None = No
         "schema": SCHEMA,
         "versions": versions(),
         "best_gaits": best,
-        "resimulations": resimulate(scenario, gaits, workers, executor),
+        "resimulations": resimulate(scenario, gaits, workers),
         "unseen": on_unseen_ground(scenario, gaits, workers),
         "disturbed": json_rows(by_gait(judgement)),
     }
@@ -199,7 +191,7 @@ def sensitivity(scenario: Scenario, gaits: Sequence[Gait], workers: int) -> list
     compiled = scenario.on_engine("compiled")
     walks = outcomes([disturbed(compiled, start) for start in starts], gaits, workers)
     undisplaced, *displaced = np.array(
-        [[math.nan if each is None else each.metrics.distance_in for each in of] for of in walks]
+        [[measured(each, "distance_in") for each in of_gait] for of_gait in walks]
     ).T
     largest: list[float] = np.abs(displaced - undisplaced).max(axis=0).tolist()
     return largest
@@ -207,31 +199,24 @@ def sensitivity(scenario: Scenario, gaits: Sequence[Gait], workers: int) -> list
 
 def outcomes(
     scenarios: Sequence[Scenario], gaits: Sequence[Gait], workers: int
-) -> list[list[SimulationResult | None]]:
-    """Results of each gait on all scenarios; None if a simulation failed."""
+) -> list[list[Outcome]]:
+    """Results, or failures, of each gait on all scenarios."""
     every = [gait for gait in gaits for _ in scenarios]
     found = simulate_many([*scenarios] * len(gaits), every, workers=workers)
-    results = [each if isinstance(each, SimulationResult) else None for each in found]
-    return [results[i : i + len(scenarios)] for i in range(0, len(results), len(scenarios))]
+    return [found[i : i + len(scenarios)] for i in range(0, len(found), len(scenarios))]
 
 
-def resimulate(
-    scenario: Scenario, gaits: Mapping[int, Gait], workers: int, executor: MakeExecutor | None
-) -> list[dict[str, Any]]:
+def resimulate(scenario: Scenario, gaits: Mapping[int, Gait], workers: int) -> list[dict[str, Any]]:
     """Table of the gaits with every setting; see Analysis."""
-    space = ParameterSpace.of(scenario)
-    tasks = [Task(space.vector(gait), trial) for trial, gait in gaits.items()]
     rows = []
     for name, changed in settings_of(scenario).items():
-        evaluate = GaitEvaluation(changed)
-        with evaluator_of(evaluate, workers=workers, executor=executor, warn=print) as evaluator:
-            evaluations = {t.trial: evaluation for t, evaluation in evaluate_all(evaluator, tasks)}
-        for trial in gaits:
-            found = defaultdict(lambda: math.nan, evaluations[trial].metrics)
-            row = {"trial": trial, "setting": name, "distance_in": found["distance"] / INCH}
-            row |= {"failure": evaluations[trial].failure}
-            row |= {metric: found[metric] for metric in _turned(scenario)}
-            rows.append({key: json_number(value) for key, value in row.items()})
+        walks = outcomes([changed], [*gaits.values()], workers)
+        for trial, (walk,) in zip(gaits, walks, strict=True):
+            row: dict[str, Any] = {"trial": trial, "setting": name}
+            for metric in ("distance_in", *_turned(scenario)):
+                row[metric] = json_number(measured(walk, metric))
+            failure = None if isinstance(walk, SimulationResult) else str(walk)
+            rows.append(row | {"failure": failure})
     return rows
 
 
@@ -242,15 +227,15 @@ def on_unseen_ground(
     ground is not random."""
     if not isinstance(scenario.terrain, Rough):
         return []
-    rows = []
+    rows: list[dict[str, Any]] = []
     scenarios = [scenario.with_changes({"terrain.seed": seed}) for seed in UNSEEN]
     for trial, walks in zip(gaits, outcomes(scenarios, [*gaits.values()], workers), strict=True):
         for seed, walk in zip(UNSEEN, walks, strict=True):
-            row: dict[str, Any] = {"trial": trial, "seed": seed, "distance_in": None, "met": False}
-            if walk is not None:
-                met = not unmet_requirements(walk.metrics, scenario.require)
-                row |= {"distance_in": walk.metrics.distance_in, "met": met}
-            rows.append(row)
+            is_met = isinstance(walk, SimulationResult) and not unmet_requirements(
+                walk.metrics, scenario.require
+            )
+            inches = json_number(measured(walk, "distance_in"))
+            rows.append({"trial": trial, "seed": seed, "distance_in": inches, "met": is_met})
     return rows
 
 

@@ -93,9 +93,8 @@ def exact_in(scenario: Scenario, engine: str) -> np.ndarray:
 
 def engines_table(scenario: Scenario, table: str) -> TextTable:
     """Table of the speed and error of engines, by ground."""
-    rows, grounds = [], {"": scenario}
-    for name, changes in GIVEN["grounds"].items():
-        grounds[name] = scenario.with_changes(changes)
+    rows = []
+    grounds = {name: scenario.with_changes(each) for name, each in GIVEN["grounds"].items()}
     for ground, engine in GIVEN[table]:
         is_mujoco = engine.startswith("!Mujoco")
         if is_mujoco and not installed():
@@ -132,13 +131,11 @@ def median_times(*runs: Callable[[], object]) -> np.ndarray:
 def batches_table(scenario: Scenario) -> TextTable:
     """Table of the compiled engine's speed with many gaits at a time, on one core and on all, as
     multiples of real time."""
-    compiled, sizes, rows = scenario.on_engine("compiled"), np.array(GIVEN["batches"]), []
+    compiled, sizes, rows = scenario.on_engine("compiled"), GIVEN["batches"], []
     for cores in sorted({1, available_cores()}):
-        some = sizes[sizes >= cores]
-        times = median_times(*(partial(walk, compiled, gaits, cores=cores) for gaits in some))
-        speeds = some * compiled.simulation.duration / times
-        too_few = [""] * (len(sizes) - len(some))
-        rows.append([str(cores), *too_few, *(f"{speed:,.0f}" for speed in speeds)])
+        times = median_times(*(partial(walk, compiled, gaits, cores=cores) for gaits in sizes))
+        speeds = compiled.simulation.duration * np.array(sizes) / times
+        rows.append([str(cores), *(f"{speed:,.0f}" for speed in speeds)])
     return TextTable(["cores/gaits", *map(str, sizes)], rows)
 
 
@@ -272,10 +269,9 @@ def tiled(tile: Any, side: int) -> StructureFile:
         group["pairs"] += copied(link["pairs"], link["by"])
     for part in ("struts", "cables"):
         tree[part] = {name: group for name, group in tree[part].items() if group["pairs"]}
-    steps = {f"{i}-{j}": np.array([i, j, 0.0]) * [*tile["step"], 0.0] for i, j in spots}
     tree["nodes"] = {
-        f"{name}-{spot}": (place + step).tolist()
-        for spot, step in steps.items()
+        f"{name}-{i}-{j}": (place + np.array([i, j, 0.0]) * [*tile["step"], 0.0]).tolist()
+        for i, j in spots
         for name, place in nodes.items()
     }
     return StructureFile.model_validate(tree | {"actuated": tile["actuated"]})

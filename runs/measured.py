@@ -1,21 +1,19 @@
 """Predictions with intervals of real structures, beside measurements; no constant is fitted.
 
-    python runs/measured.py [OUT]
+    python runs/measured.py
 
-Writes the page README.md and its pictures into the folder OUT, by default measured/. The structures
-and the measurements are files in measured/, with their sources. Predictions with intervals are kept
+Writes the page README.md and its pictures into the folder measured/. The structures and the
+measurements are files there, with their sources. Predictions with intervals are kept
 in measured/predictions/ as they are made, so that an interrupted run goes on; delete a file to make
 its predictions again. The blind predictions in measured/blind.csv stay as they were committed.
 """
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,11 +28,13 @@ from measured_robots import (
     SPRING_DAMPINGS,
     fitted_free_lengths,
     jump,
+    jumper,
     simplex_frequency,
     simplex_under_load,
     spine_poses,
 )
 from page import percent, rendered
+from script import run_script
 
 from tetra_drake.figures.style import LINE_COLOURS, common_style, line_style, save_figure
 from tetra_drake.files import write_whole
@@ -253,10 +253,11 @@ def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> 
     )
 
 
-def main(out: Path = HERE) -> None:
+def main(_: Sequence[str] = ()) -> None:
     """Writes the page, the numbers of simulations and the pictures."""
     rows, under_load, poses = measured_rows(), simplex_under_load(), spine_poses()
-    jumps = {share: [jump(share=share, damping=c) for c in SPRING_DAMPINGS] for share in JUMPS}
+    jumpers = [jumper(damping) for damping in SPRING_DAMPINGS]
+    jumps = {share: [jump(each, share) for each in jumpers] for share in JUMPS}
     figures = {
         "simplex": simplex_figure(under_load),
         "spine": spine_figure(poses),
@@ -265,15 +266,12 @@ def main(out: Path = HERE) -> None:
         "blind": intervals_figure(rows["blind"]),
     }
     for name, figure in figures.items():
-        save_figure(figure, out, name, kinds=["svg"])
+        save_figure(figure, HERE, name, kinds=["svg"])
     simulated = of_simulations(under_load, poses, jumps)
-    write_whole(out / NUMBERS, json.dumps(simulated, indent=1) + "\n")
-    write_whole(out / INTERVALS, table(rows["known"]))
-    write_whole(out / "README.md", page(simulated, rows))
-    print(out / "README.md")
+    write_whole(HERE / NUMBERS, json.dumps(simulated, indent=1) + "\n")
+    write_whole(HERE / INTERVALS, table(rows["known"]))
+    write_whole(HERE / "README.md", page(simulated, rows))
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", nargs="?", type=Path, default=HERE)
-    main(parser.parse_args().out)
+    run_script(main)

@@ -6,6 +6,7 @@ quantities of its tests. Draws within tolerances and unknowns give each quantity
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -25,31 +26,29 @@ from measured_robots import (
     VIBRATING,
     compression,
     in_the_air,
+    jump,
     lengthened,
     load_on_simplex,
     on_its_own,
     pose,
-    rise_of,
     stressed,
     structure_of,
     vibrating,
-    wound_up,
 )
 from scipy.optimize import brentq, linear_sum_assignment
+from scipy.spatial.transform import Rotation
 from script import read_settings
 
-from tetra_drake.engines.simulate import simulate_many
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import read_json, write_whole
 from tetra_drake.lab.predict.predict import drawn_scenarios, errors_of, intervals
 from tetra_drake.lab.predict.variates import Variate, variates_of
 from tetra_drake.lab.study.equilibrium import study_equilibrium
-from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.settling import axial_forces
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.scenario import Scenario, scenario_of
+from tetra_drake.scenario.scenario import Scenario
 
 KEPT = HERE / "predictions"
 """Folder of the finished cases. A case whose file is there is not computed again."""
@@ -73,24 +72,8 @@ TWIST = 15.0
 """Twist (degrees) of Laika's centre vertebra at which the loads of its feet are computed."""
 
 
-class Unknown(NamedTuple):
-    """A number that no file of the structure has: its middle, and half its width, or the standard
-    deviation of a normal law."""
-
-    middle: float
-    size: float
-    law: str = "uniform"
-
-    @property
-    def deviation(self) -> float:
-        """Standard deviation."""
-        return self.size / math.sqrt(3.0) if self.law == "uniform" else self.size
-
-
 Unknowns = dict[str, float]
 """Unknown numbers by name."""
-Draw = tuple[Scenario, Unknowns]
-"""A structure within its tolerances, and its unknown numbers."""
 Values = dict[str, float]
 """Quantities of a test by name, in the units of KINDS."""
 
@@ -100,10 +83,13 @@ class Case(NamedTuple):
 
     structure: str
     scenario: Callable[[], Scenario]
-    unknowns: dict[str, Unknown]
-    """By name. Those with the same text before a colon are one line in the table of shares."""
-    predict: Callable[[Sequence[Draw]], list[Values]]
-    """Quantities of each draw; empty if a draw has no result."""
+    unknowns: Unknowns
+    """Middles of the unknown numbers."""
+    variates: Sequence[Variate]
+    """Their errors, in the same order. Those with the same text before a colon are one line in the
+    table of shares."""
+    predict: Callable[[Scenario, Unknowns], Values]
+    """Quantities of a draw."""
     draws: int
     assumed: str
     measured: Callable[[], Values] = dict
@@ -124,28 +110,30 @@ def predicted(name: str, case: Case) -> pandas.DataFrame:
 
 def made(case: Case) -> pandas.DataFrame:
     """Intervals of a case, for its file. Raises InputError if no draw is possible."""
-    scenario, unknowns = case.scenario(), case.unknowns
-    own = variates_of(scenario.model_dump(), scenario.all_tolerances)
-    further = [
-        Variate(key.partition(":")[0], each.law, {key: each.deviation})
-        for key, each in unknowns.items()
-    ]
-    errors = errors_of([*own, *further], SEED, case.draws)
-    drawn = drawn_scenarios(scenario, own, errors[:, : len(own)])
+    scenario = case.scenario()
+    variates = variates_of(scenario.model_dump(), scenario.all_tolerances)
+    every = [*variates, *case.variates]
+    errors = errors_of(every, SEED, case.draws)
+    drawn = drawn_scenarios(scenario, variates, errors[:, : len(variates)])
     able = {k: each for k, each in enumerate(drawn) if isinstance(each, Scenario)}
     if not able:
         raise next(each for each in drawn if isinstance(each, InputError))
-    sizes = np.array([each.deviation for each in unknowns.values()])
-    numbers = np.array([each.middle for each in unknowns.values()]) + sizes * errors[:, len(own) :]
-    named = [dict(zip(unknowns, row, strict=True)) for row in numbers.tolist()]
-    found = case.predict([(each, named[k]) for k, each in able.items()])
+    sizes = [deviation for each in case.variates for deviation in each.deviations.values()]
+    numbers = [*case.unknowns.values()] + np.array(sizes) * errors[:, len(variates) :]
+    named = [dict(zip(case.unknowns, row, strict=True)) for row in numbers.tolist()]
+    found = []
+    for k, each in able.items():
+        found.append(Values())
+        with contextlib.suppress(InputError):  # there is no equilibrium
+            found[-1] = case.predict(each, named[k])
     table = pandas.DataFrame(found, index=list(able)).reindex(range(case.draws))
-    rows, shares = intervals([*own, *further], errors, table)
-    kinds = [kind_and_unit(str(quantity)) for quantity in rows.index]
-    about = {"structure": case.structure, "quantity": rows.index}
-    about |= {"kind": [kind for kind, _ in kinds], "unit": [unit for _, unit in kinds]}
-    most = {"mostly from": [_most(share) for _, share in shares.iterrows()]}
-    return pandas.DataFrame(about, index=rows.index).join(rows).assign(**most)
+    rows, shares = intervals(every, errors, table)
+    kinds, units = zip(*map(kind_and_unit, rows.index), strict=True)
+    rows.insert(0, "unit", units)
+    rows.insert(0, "kind", kinds)
+    rows.insert(0, "quantity", rows.index)
+    rows.insert(0, "structure", case.structure)
+    return rows.assign(**{"mostly from": [_most(share) for _, share in shares.iterrows()]})
 
 
 def committed() -> pandas.DataFrame:
@@ -171,19 +159,6 @@ def _most(shares: pandas.Series) -> str:
     """The two largest shares, as text."""
     largest = shares.dropna().nlargest(2)
     return "; ".join(f"{key} {100.0 * share:.0f} %" for key, share in largest.items())
-
-
-def one_by_one(
-    predict: Callable[[Scenario, Unknowns], Values], draws: Sequence[Draw]
-) -> list[Values]:
-    """Predictions of several draws, one after the other; none where there is no equilibrium."""
-    found: list[Values] = []
-    for scenario, unknown in draws:
-        try:
-            found.append(predict(scenario, unknown))
-        except InputError:
-            found.append({})
-    return found
 
 
 # The simplex
@@ -312,7 +287,7 @@ def simplex_frequencies(
         structure = structure_of(scenario)
         bars = [(mode[a], mode[b]) for a, b in structure.struts["tube"].pairs]
         ropes = [tuple(map(mode.__getitem__, cable.split()[1:])) for cable in study.cables.index]
-        masses = structure_of(scenario_of(study.robot.scenario)).masses
+        masses = structure_of(study.robot.scenario).masses
         moving = sum(masses[node] * mode[node] @ mode[node] for node in VIBRATING)
         moving += TUBE / 3.0 * sum(a @ a + a @ b + b @ b for a, b in bars)
         less = CABLE / 6.0 * sum((a - b) @ (a - b) for a, b in ropes)
@@ -379,15 +354,13 @@ def spine_measured() -> Values:
 # The jumper
 
 
-def jumper_rises(draws: Sequence[Draw]) -> list[Values]:
-    """Rises of the jumper's centre by the share that is wound up, of all draws side by side."""
-    values: list[Values] = [{} for _ in draws]
+def jumper_rises(scenario: Scenario, unknown: Unknowns) -> Values:
+    """Rises of the jumper's centre by the share that is wound up. A motion that fails has none."""
+    values: Values = {}
     for share in JUMPS:
-        commands = [wound_up(each, share + unknown["wound up"]) for each, unknown in draws]
-        outcomes = simulate_many([each for each, _ in draws], commands, record=True)
-        for own, outcome in zip(values, outcomes, strict=True):
-            rise = rise_of(outcome) if isinstance(outcome, SimulationResult) else math.nan
-            own[f"rise at {100.0 * share:.0f} %"] = rise
+        with contextlib.suppress(SimulationFailure):
+            rise, _ = jump(scenario, share + unknown["wound up"])
+            values[f"rise at {100.0 * share:.0f} %"] = rise
     return values
 
 
@@ -401,6 +374,11 @@ def jumps_measured() -> Values:
     return {
         f"rise at {100.0 * share:.0f} %": float(np.mean(measured_rise(share))) for share in JUMPS
     }
+
+
+def of_its_file(name: str) -> Scenario:
+    """Scenario of a file of HERE."""
+    return load_scenario(HERE / f"{name}.yaml")
 
 
 def standing(name: str) -> Scenario:
@@ -451,14 +429,11 @@ def measured_lifts(**_: Any) -> Values:
 
 def twisted(scenario: Scenario, degrees: float) -> Scenario:
     """Laika with half B of its centre vertebra turned about the spine."""
-    cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    changes: dict[str, object] = {}
+    turn, changes = Rotation.from_euler("y", degrees, degrees=True), dict[str, object]()
     for node, place in structure_of(scenario).nodes.items():
-        if "/tB/" not in node:
-            continue
-        turned = np.array(place) - SPINE_AXIS
-        turned[::2] = np.array([[cosine, sine], [-sine, cosine]]) @ turned[::2]
-        changes[f"robot.nodes.{node}"] = [f"{v!r} m" for v in (turned + SPINE_AXIS).tolist()]
+        if "/tB/" in node:
+            turned = turn.apply(np.array(place) - SPINE_AXIS) + SPINE_AXIS
+            changes[f"robot.nodes.{node}"] = [f"{v!r} m" for v in turned.tolist()]
     return scenario.with_changes(changes)
 
 
@@ -500,18 +475,18 @@ def laika_lifts(scenario: Scenario, unknown: Unknowns, feet: Mapping[str, Any]) 
     return values
 
 
-TESTS: dict[str, tuple[Callable[[str], Scenario], Callable[..., Any], Callable[..., Values]]] = {
+TESTS: dict[str, tuple[Callable[[str], Scenario], Callable[..., Values], Callable[..., Values]]] = {
     "loads": (in_the_air, simplex_tests, loads_measured),
     "tightened": (in_the_air, simplex_tests, tightened_measured),
     "frequencies": (in_the_air, simplex_frequencies, frequencies_measured),
     "spine": (in_the_air, spine_path, spine_measured),
-    "jumps": (lambda name: load_scenario(str(HERE / f"{name}.yaml")), jumper_rises, jumps_measured),
+    "jumps": (of_its_file, jumper_rises, jumps_measured),
     "prism": (in_the_air, prism_frequencies, measured_peaks),
     "lifts": (standing, laika_lifts, measured_lifts),
     "rest": (standing, jumper_heights, rest_measured),
 }
-"""Scenario of a robot, prediction of a draw (or, of jumps, of all draws) and measured values, by
-test. The settings of the case are arguments of the last two."""
+"""Scenario of a robot, prediction of a draw and measured values, by test. The settings of the case
+are arguments of the last two."""
 
 
 def case_of(name: str, **settings: Any) -> Case:
@@ -519,16 +494,20 @@ def case_of(name: str, **settings: Any) -> Case:
     given = CASES[name]
     given = CASES.get(given.get("like"), {}) | given
     make, predict, measured = TESTS[given["test"]]
-    further, unknowns = given.get("settings", {}) | settings, dict[str, Unknown]()
-    for key, numbers in given["unknowns"].items():
+    further = given.get("settings", {}) | settings
+    unknowns, variates = Unknowns(), list[Variate]()
+    for key, (middle, size, *normal) in given["unknowns"].items():
         of_all, _, each = key.partition(":")
-        names = [f"{of_all}:{one}" for one in each.split()] or [of_all]
-        unknowns |= dict.fromkeys(names, Unknown(*numbers))
+        law, deviation = ("normal", size) if normal else ("uniform", size / math.sqrt(3.0))
+        for name in [f"{of_all}:{one}" for one in each.split()] or [of_all]:
+            unknowns[name] = middle
+            variates.append(Variate(of_all, law, {name: deviation}))
     return Case(
         given["structure"],
         partial(make, given["robot"]),
         unknowns,
-        predict if predict is jumper_rises else partial(one_by_one, partial(predict, **further)),
+        variates,
+        partial(predict, **further),
         given["draws"],
         given["assumed"],
         partial(measured, **further),

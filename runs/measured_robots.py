@@ -14,7 +14,6 @@ from tetra_drake.lab.fit.fit import Fit, fit
 from tetra_drake.lab.fit.measurements import Rest
 from tetra_drake.lab.predict.variates import variates_of
 from tetra_drake.lab.study.equilibrium import study_equilibrium
-from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.equilibrium import Unactuated
 from tetra_drake.robot.robot import Robot
@@ -217,17 +216,19 @@ def spine_poses() -> pandas.DataFrame:
 # The jumper
 
 
-def jump(*, share: float, damping: float) -> tuple[float, float]:
-    """Rise (m) of the jumper's centre, and the least distance (m) of two rods' axes.
+def jumper(damping: float) -> Scenario:
+    """The jumper, whose springs are damped by this much (N s/m)."""
+    scenario = load_scenario(HERE / "jump.yaml")
+    return scenario.with_changes({"robot.cables.spring.damping": f"{damping} N*s/m"})
 
-    The actuators are wound up slowly by a share of UNWOUND and let go at once. The damping of the
-    springs is in N s/m.
-    """
-    scenario = load_scenario(str(HERE / "jump.yaml"))
-    scenario = scenario.with_changes({"robot.cables.spring.damping": f"{damping} N*s/m"})
-    command = wound_up(scenario, share)
-    result = simulate(scenario, command=command, record=True)
-    return rise_of(result), result.metrics.clearance
+
+def jump(scenario: Scenario, share: float) -> tuple[float, float]:
+    """Rise (m) of the jumper's centre, and the least distance (m) of two rods' axes. The actuators
+    are wound up slowly by a share of UNWOUND and let go at once."""
+    result = simulate(scenario, command=wound_up(scenario, share), record=True)
+    height = result.trajectory.p_WB.sel(axis="z").mean("body")
+    rise = height.sel(time=slice(HOLD, None)).max() - height.sel(time=HOLD, method="nearest")
+    return float(rise), result.metrics.clearance
 
 
 def wound_up(scenario: Scenario, share: float) -> Command:
@@ -236,11 +237,3 @@ def wound_up(scenario: Scenario, share: float) -> Command:
     wound = UNWOUND * (1.0 - share * np.minimum(times / WIND, 1.0))
     free_length = np.where(times < HOLD, wound, RELEASED)
     return Command("wound up and released", 0.01, np.tile(free_length[:, np.newaxis], 3))
-
-
-def rise_of(result: SimulationResult) -> float:
-    """Rise (m) of the jumper's centre after the release."""
-    assert result.trajectory is not None
-    height = result.trajectory.p_WB.sel(axis="z").mean("body")
-    rise = height.sel(time=slice(HOLD, None)).max() - height.sel(time=HOLD, method="nearest")
-    return float(rise)

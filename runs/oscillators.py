@@ -25,16 +25,15 @@ from matplotlib.figure import Figure
 from page import rendered
 from record import SCRATCH, load_experiments
 from records import append, read
-from script import evolved, run_script
+from script import evolved, measured, run_script
 from sine import PERIOD, load_sines, peak, steady_signals
 
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.evolution.run import Run
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import read_json, write_whole
+from tetra_drake.files import json_number, read_json, write_whole
 from tetra_drake.lab.study.robustness import PERCENT, by_gait, robustness
 from tetra_drake.optimizers import optimizer_of
-from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.robot.robot import Robot
@@ -152,10 +151,7 @@ def judged(run: Run, trial: int) -> dict[str, Any]:
     grounds = [load_scenario(name).terrain for name in ("rough", "steps")]
     others = [fair[-1].with_changes({"terrain": one, "robot.contacts": "all"}) for one in grounds]
     walks = simulate_many([*fair, *others], [*gaits, gaits[-1], gaits[-1]])
-    *inches, rough, steps = [
-        round(walk.metrics.distance_in, 2) if isinstance(walk, SimulationResult) else None
-        for walk in walks
-    ]
+    *inches, rough, steps = (json_number(round(measured(walk, "distance_in"), 2)) for walk in walks)
     draws = robustness(fair[-1], gaits[-1], percent=PERCENT, alone=False)
     return {
         "trial": trial,

@@ -3,15 +3,14 @@
     python runs/outdated.py [NAME ...]
 
 A recorded run is outdated if its experiment in experiments.yaml has another scenario, or if trial 0
-does not begin as recorded. The search of its first 600 evaluations, on the Drake diagram 60, is
-repeated with the recorded fitnesses: it must ask for the recorded parameters. Each gait that is
+does not begin as recorded. The search of its first 300 evaluations, on the Drake diagram 60, is
+repeated with the recorded evaluations: it must ask for the recorded parameters. Each gait that is
 kept with its parameters must go as far as recorded.
 
-Last digits do not count, as processors and versions round differently: parameters may differ by
-1e-9 of their values, distances by what a displacement by 1 nm changes (see analyse.ROUNDINGS). A
-thinned run keeps six digits of most fitnesses, so gaits that are equal in these may change places.
-CMA-ES and maps may search elsewhere on another processor, as eigenvectors of equal eigenvalues are
-arbitrary; the reason says with what the run was recorded, where that is not what is installed.
+Last digits do not count, as processors and versions round differently: parameters may differ by a
+millionth of their values, as rounding errors of CMA-ES grow from 1e-10 in 300 evaluations,
+distances by what a displacement by 1 nm changes (see analyse.ROUNDINGS). A thinned run keeps six
+digits of most fitnesses and three of metrics, so a search parts from it later.
 """
 
 from __future__ import annotations
@@ -32,13 +31,13 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.formatting import fixed, listed
 from tetra_drake.machine import available_cores
-from tetra_drake.optimizers.base import Evaluation, Task
+from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.settings.units import INCH
 
-EVALUATIONS, ON_DIAGRAM = 600, 60
+EVALUATIONS, ON_DIAGRAM = 300, 60
 """Numbers of evaluations that are repeated, on the fast engines and on the Drake diagram."""
 
-PARAMETERS = 1e-9
+PARAMETERS = 1e-6
 """Largest relative difference of parameters that does not count."""
 
 DISTANCE = 1e-3
@@ -66,18 +65,21 @@ def first_difference(run: Run) -> str:
     trial, vectors = made(run, 0), asked(run, 0, most)
     genomes = run.with_parameters.query("trial == 0 and index < @most")["index"].astype(int)
     alike = [np.allclose(vectors[i], run.vector(0, i), rtol=PARAMETERS, atol=0.0) for i in genomes]
-    kept = genomes.tolist()[: [*alike, False].index(False)]
+    kept, iterations = genomes.tolist(), trial["iteration"].astype(int)
     evaluate = GaitEvaluation(run.scenario)
     with evaluator_of(evaluate, workers=available_cores(), warn=print) as evaluator:
-        tasks = [Task(vectors[index], index) for index in kept]
-        found = {task.trial: evaluation for task, evaluation in evaluate_all(evaluator, tasks)}
+        tasks = [
+            run.manifest.task(run.vector(0, i), trial=0, index=i, iteration=iterations[i])
+            for i in kept
+        ]
+        found = {task.index: evaluation for task, evaluation in evaluate_all(evaluator, tasks)}
     for index in kept:
         before, now = trial.loc[index, "distance_in"], distance_in(found[index])
         if goes_elsewhere(run, index, before, now):
             return f"evaluation {index} goes {fixed(now, 3)} in, not {fixed(before, 3)} in"
     if all(alike):
         return ""
-    return f"search differs at evaluation {genomes.tolist()[len(kept)]} or earlier"
+    return f"search differs at evaluation {kept[alike.index(False)]} or earlier"
 
 
 def distance_in(evaluation: Evaluation) -> float:

@@ -1,9 +1,9 @@
 """Where two runs part that search with the same seeds on two engines.
 
-A search depends on its seed and on the fitnesses that it is told. So the search of a trial is
-repeated here with the fitnesses of its record, without simulations, and asks for the gaits that it
-asked for then. Two runs ask for the same gaits until a fitness differs by so much that another gait
-is chosen, or replaced.
+A search depends on its seed and on the evaluations that it is told. So the search of a trial is
+repeated here with its record, without simulations, and asks for the gaits that it asked for then.
+Two runs ask for the same gaits until a fitness differs by so much that another gait is chosen, or
+replaced.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from tetra_drake.evolution.run import Run
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.parameter_space import ParameterSpace, Vector
+from tetra_drake.scenario.metrics import METRICS
 
 
 def made(run: Run, trial: int) -> pandas.DataFrame:
@@ -29,13 +30,16 @@ def asked(run: Run, trial: int, most: int | None = None) -> list[Vector]:
     seed = np.random.SeedSequence(run.manifest.seed).spawn(scenario.evolution.trials)[trial]
     make, space = optimizer_of(scenario.optimizer), ParameterSpace.of(scenario)
     optimizer = make(space, scenario.evolution, np.random.default_rng(seed))
-    told = made(run, trial)["fitness"].fillna(-np.inf).tolist()[:most]
+    record = made(run, trial).head(most)
+    metrics = record[record.columns.intersection(list(METRICS))].to_dict("records")
+    fitnesses = record["fitness"].fillna(-np.inf)
+    told = [Evaluation(*pair) for pair in zip(fitnesses, metrics, strict=True)]
     vectors: list[Vector] = []
     while len(vectors) < len(told):
         first = len(vectors)
         vectors += optimizer.ask()
         if len(vectors) <= len(told):
-            optimizer.tell([Evaluation(fitness) for fitness in told[first : len(vectors)]])
+            optimizer.tell(told[first : len(vectors)])
     return vectors[: len(told)]
 
 

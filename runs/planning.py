@@ -16,9 +16,8 @@ import math
 import os
 import tempfile
 import time
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -54,8 +53,8 @@ from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
-PLANNING: Mapping[str, Any] = EPISODES["planner"]
-"""Arguments of the planner."""
+PLANNING, GAIT = EPISODES["planner"], EPISODES["gait"]
+"""Arguments of the planner, and what differs where it begins with a gait."""
 MODEL = "!Compiled {tolerance: 10 mm/s, max_step: 10 ms}"
 """Engine of the planner's model. Its tolerance is a hundred times coarser than the robot's."""
 
@@ -179,75 +178,75 @@ Task = Way | Ahead | Turn
 
 @dataclass(frozen=True)
 class Episode:
-    """A robot, and what it has to do."""
+    """A robot, and what it has to do: to go to a goal or to places around pillars, to turn, or to
+    go ahead."""
 
     group: str
     name: str
-    make_task: Callable[[], Task]
     base: str = "rover"
     """Name of a shipped scenario."""
-    changes: Mapping[str, Any] = field(default_factory=dict)
-    """Changes of the scenario of robot and model."""
     plant: str = "compiled"
     """Engine of the robot, see EPISODES."""
-    draw: int | None = None
-    """Number of the draw of disturbances; None without them."""
+    ground: str = "level"
+    """Ground of robot and model, see EPISODES."""
+    degrees: float = 0.0
+    friction: float | None = None
+    """Slope of an incline, and coefficient of friction there, at rest and in motion."""
+    goal: float | None = None
+    """Direction (degrees) of a goal."""
+    places: Sequence[Sequence[float]] = ()
+    pillars: Sequence[Sequence[float]] = ()
+    turn: float | None = None
+    """Heading (degrees) of a row at the end."""
+    steady: str = "0 s"
+    """Time from which the speed counts."""
     most: float = 60.0
     """Time (s) after which the episode ends."""
-    planning: Mapping[str, Any] = field(default_factory=dict)
-    """Arguments of the planner that differ from PLANNING."""
-    make_command: Callable[[], Command] | None = None
-    """Makes the command that the plans change; None without one."""
+    seed: int = 0
+    """Seed of the planner's noise."""
+    is_disturbed: bool = False
+    """True for a draw of disturbances for each goal."""
+    climbs: bool = False
+    """True if the plans change the commands of a gait."""
 
     @property
     def settings(self) -> dict[str, Any]:
         """Arguments of the planner after the cost, without the command."""
-        return {**PLANNING, **self.planning}
+        return PLANNING | {"seed": self.seed} | (GAIT["planner"] if self.climbs else {})
+
+    def task(self) -> Task:
+        """What the robot has to do."""
+        if self.turn is not None:
+            return Turn(math.radians(self.turn))
+        if self.goal is not None:
+            angle = math.radians(self.goal)
+            return Way([(FAR * math.cos(angle), FAR * math.sin(angle))])
+        return Way(self.places, self.pillars) if self.places else Ahead()
 
     def scenarios(self) -> tuple[Scenario, Scenario]:
         """Scenarios of the robot and of the planner's model."""
-        changes = {"simulation.steady_from": "0 s", "simulation.duration": f"{self.most} s"}
-        changes |= self.changes
+        changes = {"simulation.steady_from": self.steady, "simulation.duration": f"{self.most} s"}
+        changes |= EPISODES["grounds"][self.ground] | (GAIT["row"] if self.climbs else {})
+        if self.friction is not None:
+            changes |= uphill(self.degrees, self.friction)
         scenario = load_scenario(self.base).with_changes(changes)
         plant = scenario.with_changes(EPISODES["engines"][self.plant])
-        if self.draw is not None:
+        if self.is_disturbed and self.goal is not None:
+            draw = round(self.goal / 18.0)
             plant = plant.with_sections(disturbances=default_disturbances(plant))
-            plant = disturbed(plant, fresh_draws(plant, 0, self.draw + 1)[self.draw])
+            plant = disturbed(plant, fresh_draws(plant, 0, draw + 1)[draw])
         return plant, scenario.with_changes({"engine": MODEL})
 
 
-def goals() -> list[Episode]:
-    """Episodes with goals in 20 directions, or in some of them."""
+def all_episodes() -> list[Episode]:
+    """All episodes, in the order of the file: one for each combination of the values in `each`."""
     episodes = []
-    for group, given in EPISODES["goals"].items():
-        for number in range(0, 20, given.get("every", 1)):
-            angle = math.radians(18.0 * number)
-            make_task = partial(Way, [(FAR * math.cos(angle), FAR * math.sin(angle))])
-            plant, draw = given.get("plant", "compiled"), number if "draws" in given else None
-            name = f"{18 * number} degrees"
-            episodes.append(Episode(group, name, make_task, plant=plant, draw=draw))
-    return episodes
-
-
-def courses() -> list[Episode]:
-    """Episodes with pillars: the slalom, and courses with three pillars each."""
-    given = EPISODES["courses"].items()
-    return [Episode("courses", name, partial(Way, **course)) for name, course in given]
-
-
-def speeds() -> list[Episode]:
-    """The rover as fast as it can, on level ground and up inclines, on three engines."""
-    steady, plants, episodes = {"simulation.steady_from": "2 s"}, EPISODES["engines"], []
-    make = partial(Episode, "speeds", make_task=Ahead)
-    for ground, level in EPISODES["level"].items():
-        for plant, seed in itertools.product(plants, range(level["seeds"])):
-            own = {"changes": steady | level["changes"], "plant": plant, "most": 40.0}
-            name = f"{ground}, {plant}, seed {seed}"
-            episodes.append(make(name, planning={"seed": seed}, **own))
-    for (degrees, friction), plant in itertools.product(EPISODES["slopes"], plants):
-        name = f"{degrees} degrees, friction {friction:g}, {plant}"
-        changes = steady | uphill(degrees, friction)
-        episodes.append(make(name, changes=changes, plant=plant, most=10.0))
+    for row in EPISODES["episodes"]:
+        common = {key: value for key, value in row.items() if key != "each"}
+        each = row.get("each", {})
+        for values in itertools.product(*each.values()):
+            given = common | dict(zip(each, values, strict=True))
+            episodes.append(Episode(**given | {"name": row["name"].format(**given)}))
     return episodes
 
 
@@ -261,35 +260,12 @@ def uphill(degrees: float, friction: float) -> dict[str, Any]:
 def climbing_command() -> Command:
     """Commands of a gait of the row that climbs 20 degrees, one per control period. Evolves the
     gait if that is not done."""
-    gait = EPISODES["gait"]
-    changes = {**uphill(20, 0.8), **gait["row"], **gait["evolution"]}
+    changes = {**uphill(20, 0.8), **GAIT["row"], **GAIT["evolution"]}
     run = evolved(load_scenario("motors").with_changes(changes), SCRATCH)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "uphill"
-        export(run, run, out, rate=1.0 / gait["planner"]["control_period"])
+        export(run, run, out, rate=1.0 / GAIT["planner"]["control_period"])
         return load_command(out / COMMAND, run)
-
-
-def others() -> list[Episode]:
-    """Other robots: turns, and up inclines, also by changes of a gait's commands."""
-    episodes, gait = [], EPISODES["gait"]
-    for each in EPISODES["others"]:
-        task = partial(Turn, math.radians(each["turn"])) if "turn" in each else Ahead
-        changes, own = uphill(*each["slope"]) if "slope" in each else {}, {}
-        if "climb" in each:
-            changes |= gait["row"]
-            own = {"plant": each["climb"], "planning": gait["planner"]}
-            own["make_command"] = climbing_command
-        most = each.get("most", 60.0)
-        named = partial(Episode, "others", each["name"], task, each["base"], changes)
-        episodes.append(named(most=most, **own))
-    return episodes
-
-
-def all_episodes() -> list[Episode]:
-    """All episodes, in the order of their importance."""
-    every = [*goals(), *courses(), *speeds(), *others()]
-    return sorted(every, key=lambda each: GROUPS.index(each.group))
 
 
 class Over(Exception):
@@ -299,8 +275,8 @@ class Over(Exception):
 def run_episode(episode: Episode) -> tuple[Record, SimulationResult]:
     """Runs an episode. Returns its record, and the result of the same actions up to its end."""
     scenario, model = episode.scenarios()
-    task, settings = episode.make_task(), episode.settings
-    command = episode.make_command() if episode.make_command else None
+    task, settings = episode.task(), episode.settings
+    command = climbing_command() if episode.climbs else None
     planner, period = Planner(model, task, **settings, command=command), settings["control_period"]
     actions: list[np.ndarray] = []
     cpu, is_done, load = [], False, os.getloadavg()[0]
@@ -366,12 +342,12 @@ def run_all(episodes: Sequence[Episode], folder: Path) -> None:
 def main(groups: Sequence[str], folder: Path = HERE) -> None:
     """Runs the episodes of groups, or all, films the slalom, and writes the page. Raises
     InputError."""
-    groups = chosen(groups, GROUPS, "GROUP")
-    run_all([each for each in all_episodes() if each.group in groups], folder)
+    groups, episodes = chosen(groups, GROUPS, "GROUP"), all_episodes()
+    run_all([each for each in episodes if each.group in groups], folder)
     if not (folder / FILM).exists():
-        slalom, *_ = courses()
-        film(run_episode(slalom)[1], EPISODES["courses"]["slalom"]["pillars"], folder / FILM)
-    write_page(folder, Counter(episode.group for episode in all_episodes()))
+        (slalom,) = (each for each in episodes if each.name == "slalom")
+        film(run_episode(slalom)[1], slalom.pillars, folder / FILM)
+    write_page(folder, episodes)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -28,7 +29,7 @@ HERE = Path(__file__).parent / "planning"
 RECORDS, FILM = "records.jsonl", "slalom.gif"
 EPISODES: dict[str, Any] = read_settings(HERE / "episodes.yaml")
 """What is run, see the file."""
-GROUPS: list[str] = EPISODES["groups"]
+GROUPS = [*dict.fromkeys(row["group"] for row in EPISODES["episodes"])]
 """Groups of episodes, in the order of the runs."""
 NEAR, PILLAR = 0.3, 0.1
 """Distance (m) of the centre from a goal that is reached, and radius (m) of pillars."""
@@ -158,9 +159,9 @@ def costs(times: Sequence[Sequence[float]], limit: float) -> dict[str, float]:
     return {"count": len(decisions), "median": middle, "p95": most_of, "most": most, "kept": kept}
 
 
-def write_page(folder: Path, planned: Mapping[str, int]) -> None:
-    """Writes the page of the records in a folder, and its pictures. `planned` are the numbers of
-    episodes by group."""
+def write_page(folder: Path, episodes: Sequence[Any]) -> None:
+    """Writes the page of the records in a folder, and its pictures. `episodes` are all there are,
+    see planning.Episode."""
     groups: dict[str, list[Record]] = {group: [] for group in GROUPS}
     for (group, _), record in load_records(folder).items():
         groups[group].append(record)
@@ -171,7 +172,7 @@ def write_page(folder: Path, planned: Mapping[str, int]) -> None:
     found = partial(speeds, groups["speeds"])
     level = {
         ground: {plant: found(f"{ground}, {plant}, seed") for plant in plants}
-        for ground in EPISODES["level"]
+        for ground in EPISODES["grounds"]
     }
     cpu = {name: [each["cpu"] for each in of] for name, of in groups.items() if of}
     walls = [record["wall"] for record in groups["real time"]]
@@ -179,7 +180,8 @@ def write_page(folder: Path, planned: Mapping[str, int]) -> None:
     text = rendered(
         "planning.md",
         given=EPISODES,
-        planned=planned,
+        episodes=episodes,
+        planned=Counter(each.group for each in episodes),
         groups=groups,
         goals=goals,
         costs={name: costs(times, CORES * period) for name, times in cpu.items()},

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from tetra_drake.engines.simulate import Outcome
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Progress
@@ -16,6 +18,7 @@ from tetra_drake.files import read_json, read_text
 from tetra_drake.formatting import listed
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.optimizers import MakeOptimizer
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import parse_yaml
 
@@ -59,6 +62,11 @@ def read_record(path: Path, use: Callable[[Any], T], command: str) -> T:
     except (InputError, AttributeError, LookupError, TypeError, ValueError) as error:
         problem = f"cannot be read ({error!r}); run `python runs/{command}`"
         raise InputError(path, "", problem) from error
+
+
+def measured(walk: Outcome, metric: str) -> float:
+    """A metric of a simulation, such as "distance_in"; NaN if it failed."""
+    return getattr(walk.metrics, metric) if isinstance(walk, SimulationResult) else math.nan
 
 
 def evolved(scenario: Scenario, folder: Path, optimizer: MakeOptimizer | None = None) -> Run:

@@ -16,13 +16,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from script import run_script
+from script import measured, run_script
 
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import read_json, write_whole
 from tetra_drake.laws.phase import PhaseOscillators
-from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.robot.robot import Robot
@@ -87,12 +86,8 @@ def farthest(run: Run) -> dict[str, float]:
     scenario = scenario.with_changes({"cpg": cpg})
     space = ParameterSpace.of(scenario)
     gaits = [space.gait(vector, name="sine") for vector in grid(space)]
-    walks = simulate_many(scenario, gaits)
-    inches = [
-        walk.metrics.distance_in if isinstance(walk, SimulationResult) else -math.inf
-        for walk in walks
-    ]
-    best = int(np.argmax(inches))
+    inches = [measured(walk, "distance_in") for walk in simulate_many(scenario, gaits)]
+    best = int(np.nanargmax(inches))
     numbers = gaits[best].parameters
     return {
         "amplitude_n": round(amplitude, 3),

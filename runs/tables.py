@@ -37,7 +37,7 @@ from tetra_drake.laws.friction import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import looks_for_turns
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.units import INCH, Units
+from tetra_drake.settings.units import INCH
 
 HERE = Path(__file__).parent
 FRONT = HERE.parent
@@ -104,8 +104,10 @@ class Best:
     simulated."""
     kept: float
     """Share of disturbed robots on which it does as well; NaN if it turns."""
-    units: Units
-    turns: bool = False
+    unit: float
+    """Size (m, or rad) of the unit of shown distances or angles."""
+    unit_name: str
+    decimals: int = 2
     relative_speed: float = math.nan
     """Body lengths per second; NaN if unknown or if it turns."""
     known: tuple[float, float] = (math.nan, math.nan)
@@ -122,17 +124,13 @@ class Best:
         reached = self.reached[engine]
         if math.isnan(reached):
             return "-"
-        if self.turns:
-            return f"{math.degrees(reached):.0f}°"
-        return f"{fixed(reached / self.units.length, digits)} {self.units.length_name}"
+        return fixed(reached / self.unit, min(digits, self.decimals)) + self.unit_name
 
     @property
     def first(self) -> str:
         """The distance on the first engine with the range of all that are known, or the angle."""
-        if self.turns:
-            return self.text(ENGINES[0])
-        length, low, high = np.array([self.reached[ENGINES[0]], *self.known]) / self.units.length
-        return f"{uncertain(fixed(length), length, low, high)} {self.units.length_name}"
+        value, low, high = np.array([self.reached[ENGINES[0]], *self.known]) / self.unit
+        return uncertain(fixed(value, self.decimals), value, low, high) + self.unit_name
 
 
 def best_of_all(runs: Runs) -> dict[str, Best]:
@@ -143,21 +141,19 @@ def best_of_all(runs: Runs) -> dict[str, Best]:
 def best_gait(name: str, run: Analysis) -> Best:
     """The best gait of a run."""
     trial, title, scenario = run.best_trial, EXPERIMENTS[name].title, scenario_of(name)
-    reached, kept = distances_of(run, trial), float(run.disturbed.loc[trial, "kept"])
-    turns = looks_for_turns(scenario.objective)
-    if turns:
-        again = [run.again(trial, setting, TURNED) for setting in (TIGHT, MUJOCO)]
-        reached, kept = np.array([run.best_gaits.loc[trial, TURNED], *again]), math.nan
-    by_engine = dict(zip(ENGINES, reached, strict=True))
     gait, draws = run.best_gaits.loc[trial], run.disturbed.loc[trial]
-    changed = INCH * gait["sensitivity_in"]
+    if looks_for_turns(scenario.objective):
+        turns = [gait[TURNED], *(run.again(trial, each, TURNED) for each in (TIGHT, MUJOCO))]
+        by_engine = dict(zip(ENGINES, turns, strict=True))
+        return Best(title, by_engine, math.nan, math.radians(1.0), "°", decimals=0)
+    reached, changed = distances_of(run, trial), INCH * gait["sensitivity_in"]
     # MuJoCo has Coulomb friction; under another law its distance is not one of this gait.
     alike = reached if isinstance(scenario.friction, Coulomb) else reached[:2]
     known = [*alike, reached[0] - changed, reached[0] + changed, *draws[list(DRAWN)]]
-    if turns:
-        return Best(title, by_engine, kept, scenario.units, turns)
+    by_engine, units = dict(zip(ENGINES, reached, strict=True)), scenario.units
+    kept, name_of_unit = float(draws["kept"]), f" {units.length_name}"
     ends = np.nanmin(known), np.nanmax(known)
-    return Best(title, by_engine, kept, scenario.units, turns, gait[SPEED], ends)
+    return Best(title, by_engine, kept, units.length, name_of_unit, 2, gait[SPEED], ends)
 
 
 def distances_of(run: Analysis, trial: int) -> np.ndarray:
@@ -213,16 +209,14 @@ def results_table(runs: Runs) -> str:
 def trials_table(name: str, runs: Runs) -> str:
     """List of the fittest gaits of the trials of a run, on two engines and on disturbed robots.
     Below it, the trials with another distance on the diagram, and the farthest sine."""
-    run, units, rows = runs[name], scenario_of(name).units, []
-    for trial in run.best_gaits.index:
-        compiled, diagram, mujoco = distances_of(run, trial) / units.length
-        row = {"trial": trial, "compiled": compiled, "diagram": diagram, "mujoco": mujoco}
-        row["kept"] = 100.0 * run.disturbed.loc[trial, "kept"]
-        rows.append(row | {"is_apart": not abs(compiled - diagram) <= APART / units.length})
-    numbers = {"rows": rows, "units": units, "sine": load_sines().get(name), "tried": TRIED}
-    numbers["apart_by"] = f"{rounded(APART / units.length, 1)} {units.length_word}"
-    numbers["on_mujoco"] = bool(np.isfinite([row["mujoco"] for row in rows]).any())
-    return rendered("trials.md", **numbers)
+    run, units = runs[name], scenario_of(name).units
+    trials, most = run.best_gaits.index, APART / units.length
+    by_engine = [distances_of(run, trial) / units.length for trial in trials]
+    rows = pandas.DataFrame(by_engine, index=trials, columns=ENGINES)
+    rows["kept"] = 100.0 * run.disturbed["kept"]
+    apart = rows[~((rows["compiled"] - rows["diagram"]).abs() <= most)]
+    sine = {"sine": load_sines().get(name), "tried": TRIED}
+    return rendered("trials.md", rows=rows, apart=apart, most=most, units=units, **sine)
 
 
 def partings_table(name: str, other: str) -> str:

@@ -37,58 +37,21 @@ from tetra_drake.settings.refusals import TAG
 
 HERE = Path(__file__).parent / "verification"
 RESULTS = "results.json"
-PROBLEMS: dict[str, dict[str, Any]] = yaml.safe_load((HERE / "problems.yaml").read_text("utf-8"))[
-    "problems"
-]
-ENGINES = {
-    "compiled": ("!Compiled {}", "!Compiled {tolerance: 1e-7 m/s, max_step: 0.2 ms}"),
-    "drake": ("!Drake {}", "!Drake {scheme: runge_kutta3, accuracy: 1e-7, max_step: 0.5 ms}"),
-    "mujoco": ("!Mujoco {}", "!Mujoco {step: 20 us}"),
-}
-"""Each engine at its defaults, and fine."""
-STEPS = {
-    "compiled": "!Compiled {{tolerance: 10 m/s, max_step: {} s}}",
-    "drake": "!Drake {{scheme: runge_kutta3, accuracy: 1, max_step: {} s}}",
-    "mujoco": "!Mujoco {{step: {} s}}",
-}
-"""Engines whose steps all have one length, for the order of convergence."""
+GIVEN: Any = yaml.safe_load((HERE / "problems.yaml").read_text("utf-8"))
+PROBLEMS: dict[str, dict[str, Any]] = GIVEN["problems"]
+ENGINES: dict[str, dict[str, str]] = GIVEN["engines"]
 SAMPLES = 100
 Array = np.ndarray
-
-
-def cases_of(problem: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Changes of the scenario in each case."""
-    if turns := problem.get("turns"):
-        angles = np.random.default_rng(0).uniform(-1.0, 1.0, (turns, 2))
-        key = "robot.start.bodies.{}.turned"
-        return [
-            {key.format("one"): {"yaw": f"{a} rad"}, key.format("two"): {"roll": f"{b} rad"}}
-            for a, b in angles.tolist()
-        ]
-    if grid := problem.get("grid_of"):
-        return [
-            {"terrain": f"!Incline {{slope: {degrees} deg}}", "degrees": degrees, "mu": mu}
-            | dict.fromkeys(["friction.static", "friction.kinetic"], mu)
-            for mu in grid["mu"]
-            for degrees in grid["degrees"]
-        ]
-    return problem.get("cases", [{}])
 
 
 def scenario_of(problem: Mapping[str, Any], case: Mapping[str, Any]) -> Scenario:
     """The scenario of a case of a problem, on the compiled engine."""
     duration = float(problem["duration"])
-    changes = {
-        "simulation.duration": f"{duration} s",
-        "simulation.steady_from": "0 s",
-        "simulation.sample_period": f"{duration / SAMPLES} s",
-        "simulation.max_evaluations": 10**9,
-        "cpg.gain": 0.0,
-        "strut_contact": "!Nothing",
-        "terrain": "!Flat" if problem.get("ground") else "!Nothing",
-    }
-    if "tree" in problem:
-        changes["robot"] = {TAG: "Structure"} | dict(problem["tree"])
+    changes = GIVEN["world"] | {"terrain": "!Flat" if problem.get("ground") else "!Nothing"}
+    changes["simulation.duration"] = f"{duration} s"
+    changes["simulation.sample_period"] = f"{duration / SAMPLES} s"
+    if "structure" in problem:
+        changes["robot"] = {TAG: "Structure"} | dict(problem["structure"])
     changes |= problem.get("changes", {}) | problem.get("base", {})
     own = {key: value for key, value in case.items() if "." in key or key == "terrain"}
     scenario = load_scenario(problem.get("scenario", "prism")).with_changes(changes)
@@ -136,10 +99,11 @@ def followed(problem: Mapping[str, Any], result: SimulationResult) -> Array:
 
 
 def run(problem: Mapping[str, Any], engine: str, *, drift: bool = False) -> dict[str, Any]:
-    """Numbers that an engine finds, `x`, `found` and `expected`, and drift and wall time."""
+    """What an engine finds: curves `x`, `found` and `expected`, their `size`, the greatest error as
+    a share of it, drift of energy (J), and wall time `s` (s)."""
     x, found, expected, drifts = (list[float]() for _ in range(4))
     wall = 0.0
-    cases = cases_of(problem)
+    cases = problem.get("cases", [{}])
     for number, case in enumerate(cases):
         bristles = "0 N/m" if engine.startswith("!Mujoco") else "30 kN/m"
         changes = {"engine": engine, "friction.stiffness": bristles}
@@ -148,26 +112,28 @@ def run(problem: Mapping[str, Any], engine: str, *, drift: bool = False) -> dict
         wall += result.wall_time
         times = result.trajectory.time.values
         values = followed(problem, result)
-        own = dict(case) | dict(problem) | {"ground": scenario.ground, "robot": result.robot}
-        if "node" in result.trajectory.dims and isinstance(problem["follow"], list):
+        own = {**problem, **case, "ground": scenario.ground, "robot": result.robot}
+        own["start"] = scenario.robot.start
+        if isinstance(problem["follow"], list):
             own["first"] = result.trajectory.p_WN.sel(node=problem["follow"][0]).values[0]
-        known = references.__dict__.get(problem["name"], lambda times, case: 1.0 + 0.0 * times)
-        right = known(times, own)
+        right = getattr(references, problem.get("by", "formula"))(times, own)
         if drift:
             energy = energy_of(result)[0]
             drifts.append(float(np.abs(energy - energy[0]).max()))
         if len(cases) > 1:
             times, values, right = np.array([number]), values[-1:], right[-1:]
         x, found, expected = [*x, *times], [*found, *values], [*expected, *right]
-    numbers = {"x": np.array(x), "found": np.array(found), "expected": np.array(expected)}
-    return numbers | {"drift": max(drifts, default=None), "s": wall}
+    size = float(np.ptp(expected)) or 1.0
+    error = float(np.abs(np.subtract(found, expected)).max() / size)
+    curves = {"x": np.array(x), "found": np.array(found), "expected": np.array(expected)}
+    return curves | {"size": size, "error": error, "drift": max(drifts, default=None), "s": wall}
 
 
 def order_of(problem: Mapping[str, Any], name: str) -> float | None:
     """Order of convergence, from the differences of runs with a step, its half and its quarter."""
     if not (step := float(problem.get("order", {}).get(name, 0.0))):
         return None
-    runs = [run(problem, STEPS[name].format(step / 2**k))["found"] for k in range(3)]
+    runs = [run(problem, ENGINES[name]["steps"].format(step / 2**k))["found"] for k in range(3)]
     coarse, fine = (np.abs(a - b).max() for a, b in itertools.pairwise(runs))
     return math.log2(coarse / fine)
 
@@ -176,45 +142,37 @@ def verified(name: str) -> dict[str, Any]:
     """Results of a problem: curves, and for each engine the greatest errors."""
     problem = completed(name)
     if problem.get("follow") == "rest":
-        x, found, expected = getattr(references, name)()
+        x, found, expected = getattr(references, name)(problem.get("structure"))
         error = float(np.abs(np.subtract(found, expected)).max() / np.ptp(expected))
         own: dict[str, Any] = {"x": x, "expected": expected, "all": found}
         return own | {"engines": {"all": {"error": error}}}
     results: dict[str, Any] = {"engines": {}}
     is_smooth = problem.get("order") is not None
-    for engine, (default, fine) in ENGINES.items():
+    for engine, usual in ENGINES.items():
         if engine in problem.get("lacks", {}):
             continue
-        finest = problem.get("fine", {}).get(engine, "" if problem.get("long") else fine)
         numbers: dict[str, Any] = {"order": order_of(problem, engine)}
         results["engines"][engine] = numbers
-        for prefix, settings in (("", default), ("fine_", finest)):
+        fine = {} if problem.get("long") else {engine: usual["fine"]}
+        fine |= problem.get("fine", {})
+        for prefix, settings in (("", usual["default"]), ("fine_", fine.get(engine))):
             try:
                 found = run(problem, settings, drift=is_smooth) if settings else None
             except (SimulationFailure, InputError) as failure:
                 numbers[f"{prefix}failure"] = str(failure).splitlines()[0]
                 continue
             if found:
-                size = float(np.ptp(found["expected"])) or 1.0
-                results |= {k: found[k].tolist() for k in ("x", "expected")} | {"size": size}
-                results.setdefault(engine, found["found"].tolist())
-                numbers |= numbers_of(found, size, prefix)
+                results |= {key: found[key] for key in ("x", "expected", "size")}
+                results.setdefault(engine, found["found"])
+                numbers |= {f"{prefix}{key}": found[key] for key in ("error", "drift", "s")}
     return results
-
-
-def numbers_of(found: Mapping[str, Any], size: float, prefix: str) -> dict[str, Any]:
-    """Greatest error as a share, drift of energy (J) and wall time (s) of a run."""
-    error = float(np.abs(found["found"] - found["expected"]).max() / size)
-    return {f"{prefix}error": error, f"{prefix}drift": found["drift"], f"{prefix}s": found["s"]}
 
 
 def completed(name: str) -> dict[str, Any]:
     """A problem with its structure."""
     problem: dict[str, Any] = {"name": name} | PROBLEMS[name]
     if made := problem.get("made"):
-        problem["tree"] = getattr(references, made[0])(*made[1:])
-    elif "structure" in problem:
-        problem["tree"] = problem["structure"]
+        problem["structure"] = problem["structure"] | getattr(references, made[0])(*made[1:])
     return problem
 
 
@@ -245,10 +203,6 @@ def curves(result: Mapping[str, Any]) -> str:
 
 def write_page(results: Mapping[str, Any]) -> None:
     """Writes the page from the results by problem."""
-    families: dict[str, dict[str, Any]] = {}
-    for name, problem in PROBLEMS.items():
-        if name in results:
-            families.setdefault(problem["family"], {})[name] = problem
     seconds = sum(
         x.get("s", 0.0) + x.get("fine_s", 0.0)
         for r in results.values()
@@ -256,7 +210,7 @@ def write_page(results: Mapping[str, Any]) -> None:
     )
     text = rendered(
         "verification.md",
-        families=families,
+        problems=PROBLEMS,
         results=results,
         engines=[*ENGINES],
         minutes=seconds / 60.0,
@@ -267,7 +221,7 @@ def write_page(results: Mapping[str, Any]) -> None:
 def save_film(name: str) -> None:
     """Films a problem, so many times as fast as its `film` says."""
     problem = completed(name)
-    scenario = scenario_of(problem, {}).with_changes({"engine": ENGINES["compiled"][1]})
+    scenario = scenario_of(problem, {}).with_changes({"engine": ENGINES["compiled"]["fine"]})
     result = simulate(scenario, seeded_gait(scenario), record=True)
     film = {"size": (240, 180), "fps": 12.0, "view": "side", "speed": problem["film"]}
     result.save_video(HERE / f"{name}.gif", **film)

@@ -1,7 +1,7 @@
 """Structures of the problems of verification/problems.yaml that are made by rules, and references.
 
-A reference is a closed form, an elliptic integral or equations of its own, solved by SciPy. It
-knows the numbers of the problem, not the engines.
+A reference is a formula of the file, see formula(), or a function here. It knows the numbers of the
+problem, not the engines.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,10 @@ from tetra_drake.systems import MatsuokaCpg
 G = 9.80665
 Array = np.ndarray
 Case = Mapping[str, Any]
-"""Changes of a case by scenario key, with the problem's own keys; `tree` is its structure."""
+"""A problem with one of its cases: also its `robot`, `ground`, `start`, and the place `first` of a
+node that is followed."""
+FUNCTIONS = vars(np) | {"G": G, "ellipj": ellipj, "ellipk": ellipk}
+"""Functions and constants in formulas."""
 
 
 def solved(rate: Callable[..., Any], start: Any, times: Array, **options: Any) -> Array:
@@ -43,22 +47,37 @@ def solved(rate: Callable[..., Any], start: Any, times: Array, **options: Any) -
     return np.asarray(solve_ivp(rate, (0.0, times[-1]), start, t_eval=times, **given).y)
 
 
-def number(text: Any) -> float:
-    """The number of a quantity in SI units."""
-    return float(str(text).split()[0])
+def formula(times: Array, case: Case) -> Array:
+    """Values (times,) of the formula `known`. It has the names in the case, the time t, `states` of
+    differential equations, given by their starts and rates, and what `let` derives from these."""
+
+    def code(text: object) -> CodeType:
+        return compile(str(text), case["name"], "eval")
+
+    states = case.get("states", {})
+    rates = [code(rate) for _, rate in states.values()]
+    derived = {name: code(text) for name, text in case.get("let", {}).items()}
+
+    def names_at(t: Any, y: Any) -> dict[str, Any]:
+        names = {**case, "t": t, **dict(zip(states, y, strict=True))}
+        for name, each in derived.items():
+            names[name] = eval(each, FUNCTIONS, names)
+        return names
+
+    def rate(t: float, y: Array) -> list[float]:
+        names = names_at(t, y)
+        return [eval(each, FUNCTIONS, names) for each in rates]
+
+    start = [eval(code(each), FUNCTIONS, {**case}) for each, _ in states.values()]
+    y = solved(rate, start, times, **case.get("solver", {})) if states else np.zeros(0)
+    return np.asarray(eval(code(case["known"]), FUNCTIONS, names_at(times, y)) + 0.0 * times)
 
 
 # Bodies
 
 
-def pendulum(times: Array, case: Case) -> Array:
-    rate, k = math.sqrt(0.5 * G / (1.0 / 3.0 + 0.25 * 0.004**2)), math.sin(math.pi / 4)
-    sine = k * ellipj(ellipk(k**2) - rate * times, k**2)[0]
-    return -np.sin(2.0 * np.arcsin(sine))
-
-
-def four_bar_tree(windows: int) -> dict[str, Any]:
-    """Cranks a-b and couplers between them, rods of 1 m and 1 kg."""
+def four_bar_tree(windows: int, rod: Case) -> dict[str, Any]:
+    """Cranks a-b and couplers between them."""
     nodes, pairs = {"w": [0, 9, 0]}, [[f"a{i}", f"b{i}"] for i in range(windows + 1)]
     for i in range(windows + 1):
         nodes |= {f"a{i}": [i, 0, 0], f"b{i}": [i, 0, 1]}
@@ -66,24 +85,12 @@ def four_bar_tree(windows: int) -> dict[str, Any]:
     spin = {"velocity": ["-0.5 m/s", 0, 0], "spin": [0, "1 rad/s", 0]}
     cranks = {f"a{i} b{i}": spin for i in range(windows + 1)}
     return {
-        "unit": "m",
         "nodes": nodes,
-        "struts": {"rod": BAR | {"pairs": pairs, "density": f"{1.0 / (math.pi * 4e-6)} kg/m^3"}},
-        "cables": {"cord": CORD | {"pairs": [["a0", "w"]]}},
+        "struts": {"rod": {**rod, "pairs": pairs}},
         "pinned": [f"b{i}" for i in range(windows + 1)],
         "anchors": {"w": "xyz"} | {f"a{i}": "xyz" for i in range(windows + 1)},
         "start": {"rest": False, "velocity": ["1 m/s", 0, 0], "bodies": cranks},
     }
-
-
-BAR = {"diameter": "4 mm", "node_diameter": "0 m", "contact_radius": "0 m"}
-CORD = {"stiffness": "1 N/m", "damping": "0 N*s/m", "free_length": "900 m"}
-
-
-def four_bar(times: Array, case: Case) -> Array:
-    n = case["made"][1]
-    square = G * (0.5 * (n + 1) + n) / ((n + 1) * (1.0 / 3.0 + 1e-6) + n)
-    return np.sin(solved(lambda _, y: [y[1], square * math.sin(y[0])], [0.0, 1.0], times)[0])
 
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 0, -1], [1, 1, -1], [0, 1, -1], [0, 1, 0]], float)
@@ -130,59 +137,8 @@ def turning(inertia: Array, spin: Array, arm: Array, times: Array) -> Array:
     return np.asarray(Rotation.from_quat(y[[1, 2, 3, 0]].T).apply(arm))
 
 
-BRICK = np.diag([2.568e-3, 8.421e-3, 9.755e-3])
-
-
-def brick(times: Array, case: Case) -> Array:
-    return turning(BRICK, np.radians([10.0, 20.0, 30.0]), np.array([0.1, 0, 0]), times)[:, 1]
-
-
-def dzhanibekov(times: Array, case: Case) -> Array:
-    return turning(BRICK, np.array([0, 10.0, 0.1]), np.array([0, 0.05, 0]), times)[:, 1]
-
-
-def projectile(times: Array, case: Case) -> Array:
-    return 1.0 + 4.0 * times - 0.5 * G * times**2
-
-
-def throw(times: Array, case: Case) -> Array:
-    structure = case["robot"].structure
-    height = structure.mass @ structure.p_WB[:, 2] / structure.mass.sum()
-    return height - 1.0 + projectile(times, case)
-
-
-def double_pendulum(times: Array, case: Case) -> Array:
-    lengths, radius = np.array([0.4, 0.3]), 0.004
-    m, n = masses = 1200.0 * math.pi * radius**2 * lengths
-    i, j = masses * (lengths**2 / 12.0 + radius**2 / 4.0)
-
-    def rate(_: float, y: Array) -> Array:
-        a, b, a_rate, b_rate = y
-        across = 0.5 * n * 0.4 * 0.3
-        mixed, bent = across * math.cos(a - b), across * math.sin(a - b)
-        inertia = [[i + (0.25 * m + n) * 0.16, mixed], [mixed, j + 0.25 * n * 0.09]]
-        force = [
-            -bent * b_rate**2 - (0.5 * m + n) * G * 0.4 * math.sin(a),
-            bent * a_rate**2 - 0.5 * n * G * 0.3 * math.sin(b),
-        ]
-        return np.append(y[2:], np.linalg.solve(inertia, force))
-
-    a, b = solved(rate, [math.pi / 2, math.pi / 2, 0.0, 0.0], times)[:2]
-    return 0.4 * np.sin(a) + 0.3 * np.sin(b)
-
-
-def snap(times: Array, case: Case) -> Array:
-    inertia, first = 0.25 + 1.0 / 12.0 + 0.25 * 0.004**2, math.pi / 6
-
-    def rate(_: float, y: Array) -> list[float]:
-        taut = max(0.0, math.cos(y[0]) - math.cos(first))
-        return [y[1], (160.0 * taut * math.sin(y[0]) - 0.5 * G * math.cos(y[0])) / inertia]
-
-    return np.sin(solved(rate, [first, 0.0], times)[0])
-
-
-def precession(times: Array, case: Case) -> Array:
-    structure = case["robot"].structure
+def free_body(times: Array, case: Case) -> Array:
+    structure, axis = case["robot"].structure, "xyz".index(case["follow"][1])
     centre = structure.mass @ structure.p_WB / structure.mass.sum()
     inertia = np.zeros((3, 3))
     for mass, unit, q, p in zip(
@@ -191,240 +147,93 @@ def precession(times: Array, case: Case) -> Array:
         body = SpatialInertia(mass, np.zeros(3), UnitInertia(*unit))
         body = body.ReExpress(RotationMatrix(Quaternion(q))).Shift(centre - p)
         inertia += body.CopyToFullMatrix6()[:3, :3]
-    arm = case["first"] - centre
-    return centre[2] + turning(inertia, np.array([1.0, 0.0, 6.0]), arm, times)[:, 2]
+    arm, spin = case["first"] - centre, np.array(case["start"].spin)
+    return centre[axis] + turning(inertia, spin, arm, times)[:, axis]
 
 
 # Contact
 
 
-def backspin(times: Array, case: Case) -> Array:
-    until = 3.0 / (3.5 * 0.5 * G)
-    sliding = np.minimum(times, until)
-    way = 2.0 * sliding - 0.25 * G * sliding**2
-    return way + (2.0 - 0.5 * G * until) * (times - sliding)
-
-
-def hoop(times: Array, case: Case) -> Array:
-    slope = math.radians(20.0)
-    rolls = 0.0 if "friction.static" in case else number(case["robot.bodies.one.inertia"][0])
-    way = 0.5 * G * math.sin(slope) / (1.0 + rolls / (0.5 * 0.05**2)) * times**2
-    return -0.05 * math.sin(slope) - math.cos(slope) * way
-
-
-def disk_tree(count: int) -> dict[str, Any]:
-    """A disk of 0.1 m and 0.1 kg, tilted by 45 degrees, as a ring of nodes."""
+def disk_tree(count: int, disk: Case) -> dict[str, Any]:
+    """A disk of 0.1 m as a ring of nodes."""
     angles = 2.0 * np.pi * np.arange(count) / count - 0.5 * np.pi
     nodes = {f"r{i}": [0.1 * math.cos(a), 0.1 * math.sin(a), 0] for i, a in enumerate(angles)}
-    spin = DISK_RATE * math.sin(math.pi / 4) ** 2
-    moments = ["2.5e-4 kg*m^2", "2.5e-4 kg*m^2", "5e-4 kg*m^2"]
-    body = {"nodes": [*nodes], "mass": "0.1 kg", "centre": [0, 0, 0], "inertia": moments}
-    return {
-        "unit": "m",
-        "nodes": nodes | {"w": [0, 9, 0]},
-        "bodies": {"disk": body},
-        "cables": {"cord": CORD | {"pairs": [["r0", "w"]]}},
-        "anchors": {"w": "xyz"},
-        "contacts": [*nodes],
-        "start": {
-            "rest": False,
-            "turned": {"roll": "45 deg"},
-            "spin": [0, f"{spin} rad/s", f"{spin} rad/s"],
-        },
-    }
-
-
-DISK_RATE = math.sqrt(4.0 * G / (0.1 * math.sin(math.pi / 4)))
-"""Rate (rad/s) at which a tilted disk rolls on around its resting centre."""
-
-
-def disk(times: Array, case: Case) -> Array:
-    rolled = DISK_RATE * math.cos(math.pi / 4) * times
-    return 0.1 * math.sin(math.pi / 4) * (1.0 - np.cos(rolled))
-
-
-def ramp(times: Array, case: Case) -> Array:
-    slope, mu = math.radians(case["degrees"]), case["mu"]
-    pull = max(0.0, math.sin(slope) - mu * math.cos(slope))
-    return -0.5 * math.cos(slope) * G * pull * times**2
-
-
-def stopping(times: Array, case: Case) -> Array:
-    speed = number(case["robot.start.velocity"][0])
-    return np.full_like(times, speed**2 / G)
-
-
-def hunt_crossley(
-    times: Array, z: float, v: float, m: float, k: float, c: float, g: float
-) -> Array:
-    def rate(_: float, y: Array) -> list[float]:
-        depth = max(0.0, -y[0])
-        return [y[1], max(0.0, k * depth - c * depth * y[1]) / m - g]
-
-    return solved(rate, [z, v], times, max_step=1e-4, method="RK45", rtol=1e-9)
-
-
-def bounce(times: Array, case: Case) -> Array:
-    return hunt_crossley(times, 0.1, 0.0, 0.1, 1e4, 2e3, G)[0]
-
-
-def settling(times: Array, case: Case) -> Array:
-    ground, speed = case["ground"], 1e-3 * case["mm_per_s"]
-    y = hunt_crossley(times, 1e-5, -speed, 0.02, ground.stiffness, ground.damping, 0.0)
-    return y[1] / speed
-
-
-def stick_slip(times: Array, case: Case) -> Array:
-    speed, rate, low, high = 0.1, math.sqrt(2.0), 0.25, 0.75
-    slip = 2.0 * (math.pi - math.atan(0.25 * rate / speed)) / rate
-    period = slip + (high - low) / speed
-    jump = speed * period
-    since = (times - high / speed) % period
-    cycles = np.floor((times - high / speed) / period)
-    slipping = 0.5 + 0.25 * np.cos(rate * since) + speed / rate * np.sin(rate * since)
-    moved = high + speed * since - slipping
-    return np.where(times < high / speed, 0.0, cycles * jump + np.where(since < slip, moved, jump))
+    body = {**disk, "nodes": [*nodes], "centre": [0, 0, 0]}
+    return {"nodes": nodes | {"w": [0, 9, 0]}, "bodies": {"disk": body}, "contacts": [*nodes]}
 
 
 # Cables
 
 
-def beads_tree(kind: str, count: int) -> dict[str, Any]:
-    """A folded chain, or a rope between two walls."""
-    if kind == "chain":
-        nodes = {
-            f"b{i}": [0.02 * (i > count / 2), 0, -0.05 * min(i, count - i)]
-            for i in range(count + 1)
-        }
-        law = {"stiffness": "2e3 N/m", "damping": "0.05 N*s/m", "free_length": "0.05 m"}
-        ends, gravity = ["b0"], f"{G} m/s^2"
-    else:
-        angles = np.pi * np.arange(count + 2) / (count + 1)
-        nodes = {f"b{i}": [0.025 * i, 0, 1e-4 * math.sin(a)] for i, a in enumerate(angles)}
-        law = {"stiffness": "1e4 N/m", "damping": "0 N*s/m", "free_length": "0.024 m"}
-        ends, gravity = ["b0", f"b{count + 1}"], "0 m/s^2"
-    names = [*nodes]
+def chain_tree(count: int, law: Case) -> dict[str, Any]:
+    """A folded chain."""
+    places = [[0.02 * (i > count / 2), 0, -0.05 * min(i, count - i)] for i in range(count + 1)]
+    return beads_tree(places, count, law)
+
+
+def rope_tree(count: int, law: Case) -> dict[str, Any]:
+    """A rope between two walls."""
+    angles = np.pi * np.arange(count + 2) / (count + 1)
+    places = [[0.025 * i, 0, 1e-4 * math.sin(a)] for i, a in enumerate(angles)]
+    return beads_tree(places, count, law)
+
+
+def beads_tree(places: Sequence[Sequence[float]], count: int, law: Case) -> dict[str, Any]:
+    """Beads of 10 g on cables; those at the ends, which are held, have no mass."""
+    nodes = {f"b{i}": place for i, place in enumerate(places)}
     return {
-        "unit": "m",
         "nodes": nodes,
-        "masses": {name: "10 g" for name in names if name not in ends},
-        "cables": {"link": law | {"pairs": [list(pair) for pair in itertools.pairwise(names)]}},
-        "anchors": dict.fromkeys(ends, "xyz"),
-        "gravity": gravity,
-        "start": {"rest": False},
+        "masses": {f"b{i}": "10 g" for i in range(1, count + 1)},
+        "cables": {"link": {**law, "pairs": [list(pair) for pair in itertools.pairwise(nodes)]}},
     }
 
 
-def on_cables(tree: Mapping[str, Any], masses: Sequence[float], node: str, times: Array) -> Array:
-    """Heights (times,) of a node where point masses hang on straight cables that only pull."""
-    names, (cables,) = [*tree["nodes"]], tree["cables"].values()
-    k, c, free = (number(cables[key]) for key in ("stiffness", "damping", "free_length"))
-    first, last = np.array([[names.index(x) for x in pair] for pair in cables["pairs"]]).T
-    start = np.array([tree["nodes"][name] for name in names], dtype=float)
-    held = np.isin(names, [*tree["anchors"]])
-    weight = number(tree.get("gravity", G))
+def on_cables(times: Array, case: Case) -> Array:
+    """Heights of the node where point masses hang on straight cables that only pull."""
+    given = case["robot"].scenario.robot
+    names, (cables,) = [*given.nodes], given.cables.values()
+    first, last = np.array([[names.index(x) for x in pair] for pair in cables.pairs]).T
+    start, held = np.array([*given.nodes.values()]), np.isin(names, [*given.anchors])
+    masses = np.array([[given.masses.get(name, 1.0)] for name in names])
 
     def rate(_: float, y: Array) -> Array:
         p, v = y.reshape(2, -1, 3)
         apart = p[last] - p[first]
         length = np.linalg.norm(apart, axis=1)
         along = apart / length[:, None]
-        pull = k * np.maximum(length - free, 0.0)
-        damped = c * ((v[last] - v[first]) * along).sum(axis=1)
+        pull = cables.stiffness * np.maximum(length - cables.free_length, 0.0)
+        damped = cables.damping * ((v[last] - v[first]) * along).sum(axis=1)
         force = (pull + np.clip(damped, -pull, pull))[:, None] * along
         total = np.zeros_like(p)
         np.add.at(total, first, force)
         np.add.at(total, last, -force)
-        acceleration = total / np.array(masses)[:, None] - [0.0, 0.0, weight]
+        acceleration = total / masses - [0.0, 0.0, given.gravity]
         acceleration[held] = 0.0
         return np.concatenate([v.ravel(), acceleration.ravel()])
 
     begin = np.append(start.ravel(), np.zeros(start.size))
     y = solved(rate, begin, times, rtol=1e-9, atol=1e-11)
-    return y[3 * names.index(node) + 2]
-
-
-def chain(times: Array, case: Case) -> Array:
-    return on_cables(case["tree"], [0.01] * 21, "b20", times)
-
-
-def rope(times: Array, case: Case) -> Array:
-    rate = 2.0 * math.sqrt(10.0 / (0.01 * 0.025)) * math.sin(math.pi / 82)
-    return 1e-4 * math.sin(20 * math.pi / 41) * np.cos(rate * times)
-
-
-def tether(times: Array, case: Case) -> Array:
-    return on_cables(case["tree"], [1.0, 0.2], "p", times)
-
-
-def atwood(times: Array, case: Case) -> Array:
-    heavy, light, k = 0.2, 0.1, 1e3
-    square = k * (1.0 / heavy + 1.0 / light)
-    middle, before = 2.0 * G / square, light * G / k
-    stretch = middle + (before - middle) * np.cos(math.sqrt(square) * times)
-    moment = 0.5 * (heavy - light) * G * times**2
-    return -(moment + light * (stretch - before)) / (heavy + light)
-
-
-def bead(times: Array, case: Case) -> Array:
-    def rate(_: float, y: Array) -> list[float]:
-        half = math.hypot(0.2, y[0])
-        return [y[1], -2e3 * max(0.0, 2.0 * half - 0.38) * y[0] / half / 0.1]
-
-    return solved(rate, [0.06, 0.0], times)[0]
-
-
-def flyball(times: Array, case: Case) -> Array:
-    square, lever, mass = 0.3 / 3.0 + 5.0, 0.3 * 0.5 + 5.0, 3.0
-
-    def rate(_: float, y: Array) -> list[float]:
-        a, down, spin, a_rate, rate_down = y
-        s, c = math.sin(a), math.cos(a)
-        across, along = 0.5 * s, down - 0.5 * c
-        length = math.hypot(across, along)
-        by_a, by_down = (across * 0.5 * c + along * 0.5 * s) / length, along / length
-        pull = 8e5 * max(0.0, length - 0.5)
-        damped = 4e4 * (by_a * a_rate + by_down * rate_down)
-        force = 2.0 * (pull + min(max(damped, -pull), pull))
-        inertia = 0.01 + 2.0 * square * s * s
-        a_force = 2.0 * square * s * c * spin**2 - 2.0 * lever * G * s - force * by_a
-        turn = -4.0 * square * s * c * a_rate * spin / inertia
-        return [a_rate, rate_down, turn, a_force / (2.0 * square), G - force * by_down / mass]
-
-    start = [math.pi / 6, math.sqrt(0.75), 2.0 * math.pi, 0.0, 0.0]
-    return -solved(rate, start, times, method="Radau", rtol=1e-9, atol=1e-11)[1]
+    return y[3 * names.index(case["follow"][0]) + 2]
 
 
 # At rest: what the package finds, and the reference
 
 
 def at_rest(**tree: Any) -> EquilibriumStudy:
-    """A structure at rest. It has a slack cord besides, and no ground."""
-    given: dict[str, Any] = {"unit": "m", "gravity": 0, "struts": {}, "anchors": {}} | tree
-    given["struts"] = {k: BAR | {"density": "1200 kg/m^3"} | s for k, s in given["struts"].items()}
+    """A structure without weight at rest."""
+    given = {"unit": "m", "gravity": 0, "anchors": {}, **tree}
     return study_equilibrium(robot_of_structure(StructureFile.from_tree(given, "made"), "made"))
 
 
-def truss() -> tuple[Array, Array, Array]:
+def truss(tree: dict[str, Any]) -> tuple[Array, Array, Array]:
     whole, loads = math.hypot(1.0, 0.3), np.arange(0.0, 901.0, 180.0)
 
     def missing(h: float, load: float) -> float:
         return 2e5 * (whole / math.hypot(1.0, h) - 1.0) * h - load
 
     expected = [brentq(missing, 0.175, 0.3, (load,), xtol=1e-14) for load in loads]
-    found = [
-        at_rest(
-            nodes={"l": [-1, 0, 0], "r": [1, 0, 0], "p": [0, 0, 0.3], "w": [0, 9, 0]},
-            struts={"bar": {"pairs": [["l", "p"], ["p", "r"]], "axial_stiffness": "1e5 N/m"}},
-            pinned=["p"],
-            cables={"cord": CORD | {"pairs": [["p", "w"]]}},
-            anchors={"l": "xyz", "r": "xyz", "p": "y", "w": "xyz"},
-            anchor_stiffness="1e10 N/m",
-            joint_stiffness="1e10 N/m",
-            loads={"p": [0, 0, f"{-load} N"]},
-        ).nodes.z["p"]
-        for load in loads.tolist()
-    ]
+    downward = [{"p": [0, 0, f"{-load} N"]} for load in loads.tolist()]
+    found = [at_rest(**tree, loads=each).nodes.z["p"] for each in downward]
     return loads, np.array(found), np.array(expected)
 
 
@@ -439,18 +248,17 @@ def prism_of(count: int, twist: float, density: float, stiffness: float) -> Equi
     k = {"stiffness": f"{stiffness} N/m", "damping": "1 N*s/m"}
     reach = 2.0 * math.sin(math.pi / count)
     up = math.hypot(1.0, 2.0 * math.sin(0.5 * (math.pi / 2 - math.pi / count)))
-    per_length = {"a": density, "b": density, "side": density * reach}
-    lengths = {"a": reach, "b": reach, "side": up}
-    cables = {
-        name: k
-        | {"pairs": pairs[name], "free_length": f"{x * (1.0 - per_length[name] / stiffness)!r} m"}
-        for name, x in lengths.items()
-    }
-    struts = {"bar": {"pairs": [[f"a{i}", f"b{j}"] for i, j in ring]}}
-    return at_rest(nodes=nodes, struts=struts, cables=cables)
+    sizes = {"a": (reach, density), "b": (reach, density), "side": (up, density * reach)}
+    cables = {}
+    for name, (length, own) in sizes.items():
+        free = f"{length * (1.0 - own / stiffness)!r} m"
+        cables[name] = k | {"pairs": pairs[name], "free_length": free}
+    bar: dict[str, Any] = {"diameter": "4 mm", "density": "1200 kg/m^3", "node_diameter": "0 m"}
+    bar |= {"contact_radius": "0 m", "pairs": [[f"a{i}", f"b{j}"] for i, j in ring]}
+    return at_rest(nodes=nodes, struts={"bar": bar}, cables=cables)
 
 
-def twist() -> tuple[Array, Array, Array]:
+def twist(_: Any) -> tuple[Array, Array, Array]:
     counts, found = np.arange(3, 9), []
     for count in counts.tolist():
         nodes = prism_of(count, math.pi / 2 - math.pi / count - 0.05, 10.0, 100.0).nodes
@@ -459,22 +267,22 @@ def twist() -> tuple[Array, Array, Array]:
     return counts, np.array(found), 90.0 - 180.0 / counts
 
 
-def prism_modes() -> tuple[Array, Array, Array]:
+def prism_modes(_: Any) -> tuple[Array, Array, Array]:
     shares = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
-    found = [
-        prism_of(3, math.pi / 6, 10.0 * share, 1e6).frequencies[0] ** 2 for share in shares.tolist()
-    ]
-    return shares, np.array(found) / found[0], shares
+    prisms = [prism_of(3, math.pi / 6, 10.0 * share, 1e6) for share in shares.tolist()]
+    found = np.array([prism.frequencies[0] ** 2 for prism in prisms])
+    return shares, found / found[0], shares
 
 
-def rope_modes() -> tuple[Array, Array, Array]:
-    n, known = np.arange(1, 41), at_rest(**beads_tree("rope", 40)).frequencies
+def rope_modes(tree: dict[str, Any]) -> tuple[Array, Array, Array]:
+    n, known = np.arange(1, 41), at_rest(**tree).frequencies
     expected = math.sqrt(10.0 / (0.01 * 0.025)) * np.sin(n * math.pi / 82) / math.pi
     return n, known[np.abs(known[:, None] - expected).argmin(axis=0)], expected
 
 
-def rings() -> tuple[Array, Array, Array]:
-    tau, fatigue, beta, found = 0.1, 0.6, 2.5, []
+def rings(_: Any) -> tuple[Array, Array, Array]:
+    tau, fatigue, beta = 0.1, 0.6, 2.5
+    found, expected = list[float](), list[float]()
     for count, weight in ((2, 1.0 + tau / fatigue), (3, 2.5), (5, 2.5)):
         weights = np.zeros((count + count % 2,) * 2)
         for i in range(count):
@@ -489,8 +297,15 @@ def rings() -> tuple[Array, Array, Array]:
             simulator.AdvanceTo(time)
             states.append(simulator.get_context().get_continuous_state_vector().CopyToVector()[0])
         found.append(period(times, np.array(states)))
-    pair = 2.0 * math.pi * math.sqrt(tau * fatigue / (beta - tau / fatigue))
-    return np.array([2, 3, 5]), np.array(found), np.array([pair, 0.3271, 0.6405])
+
+        def rate(_: float, y: Array, weights: Array = weights) -> Array:
+            u, v = y.reshape(2, -1)
+            y = np.maximum(u, 0.0)
+            return np.append((1.0 - u - beta * v - weights @ y) / tau, (y - v) / fatigue)
+
+        expected.append(period(times, solved(rate, start, times, max_step=1e-2)[0]))
+    expected[0] = 2.0 * math.pi * math.sqrt(tau * fatigue / (beta - tau / fatigue))
+    return np.array([2, 3, 5]), np.array(found), np.array(expected)
 
 
 def period(times: Array, values: Array) -> float:

@@ -189,6 +189,22 @@ def test_the_scenarios_and_the_gait_of_the_pages_load(work: Path) -> None:
     }
 
 
+def test_the_springs_of_a_catalogue_are_as_the_page_says(work: Path) -> None:
+    page = text_of("scenario/structures")
+    (coils,) = (file for file in snippets("yaml", page) if "max_tension" in file)
+    rows = re.findall(r"^\| (?:linear|with initial tension) \|(.*)", page, re.M)
+    for row, given in zip(rows, [r" *initial_tension: 0.22 N(,|\n)", "nothing"], strict=True):
+        (work / "coils.yaml").write_text(re.sub(given, "", coils))
+        study = td.study_equilibrium("coils.yaml")
+        tension, length = (study.cables[name].to_numpy()[[0, -1]] for name in ("tension", "length"))
+        told = [float(number) for number in re.findall(r"[\d.]+", row)]
+        height = 1e3 * study.nodes["z"].max()
+        found = [height, *np.transpose([tension, 1e3 * length]).ravel(), *study.frequencies[:3]]
+        assert found == pytest.approx(told, rel=5e-3)
+        densities = tension / length
+        assert densities[1] / densities[0] == pytest.approx(np.sqrt(3.0), rel=5e-3)  # of any prism
+
+
 def test_the_roads_name_what_the_files_have() -> None:
     page = " ".join(text_of("README").split())
     named = re.findall(r"\]\(([\w/]+\.py)\):((?:,? `\w+`)+)", page)

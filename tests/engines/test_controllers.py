@@ -19,8 +19,6 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems import SampledController
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
-EXPLICIT = Drake(scheme="runge_kutta3", accuracy=1e-6)
-
 
 @pytest.fixture
 def walking() -> Scenario:
@@ -50,66 +48,43 @@ def test_what_a_controller_raises_comes_through_as_it_is(walking, engine, kind):
     assert caught.value is error
 
 
-def bodies_at(time: float, robot: Robot, engine: Drake, held: np.ndarray | None = None, **options):
-    """Positions of the bodies, and the signals, after a time on the diagram; `held` signals come
-    from outside."""
-    diagram = MakeTensegrityDiagram(robot, **options)
+@pytest.mark.parametrize("held", [None, np.linspace(0.5, 4.0, 4)], ids=["law", "held"])
+def test_a_diagram_moves_by_its_controller_or_signals_from_outside_as_by_simulate(
+    walking, controller, held
+):
+    """The function is called at the same times, and its forces are held."""
+    engine, times = Drake(scheme="runge_kutta3", accuracy=1e-6), list[float]()
+
+    def law(time: float, readings: Readings) -> np.ndarray:
+        times.append(time)
+        return controller(time, readings) if held is None else held
+
+    robot = controlled_robot(walking)
+    system = None if held is not None else SampledController(robot, law, period=0.02)
+    diagram = MakeTensegrityDiagram(robot, controller=system)
     simulator = MakeSimulator(diagram, robot, engine)
     context = simulator.get_mutable_context()
     if held is not None:
         diagram.GetInputPort("signals").FixValue(context, held)
-    simulator.AdvanceTo(time)
+    simulator.AdvanceTo(0.1)
     state, signals = (diagram.GetOutputPort(name).Eval(context) for name in ("state", "signals"))
-    return state[:21].reshape(3, 7)[:, 4:], signals
-
-
-def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
-    """The function is called at the same times, and its forces are held."""
-    accurate, times = Drake(accuracy=1e-5, max_step=1e-3), list[float]()
-
-    def law(time: float, readings: Readings) -> np.ndarray:
-        times.append(time)
-        return controller(time, readings)
-
-    robot = controlled_robot(walking)
-    system = SampledController(robot, law, period=0.02)
-    p_WB, signals = bodies_at(0.1, robot, accurate, controller=system)
-    np.testing.assert_allclose(times, 0.02 * np.arange(5), atol=1e-12)
-    short = shortly(walking, 0.1, engine=accurate)
-    result = simulate(short, controller=controller, record=True)
-    np.testing.assert_allclose(p_WB, result.trajectory.p_WB[-1], atol=1e-7)
-    np.testing.assert_allclose(signals, result.trajectory.signal[-1], atol=1e-4)
+    result = simulate(shortly(walking, 0.1, engine=engine), controller=law, record=True)
+    end = result.trajectory.isel(time=-1)
+    np.testing.assert_allclose(state[:21].reshape(3, 7)[:, 4:], end.p_WB, atol=1e-7)
+    np.testing.assert_allclose(signals, end.signal, atol=1e-4)
+    np.testing.assert_allclose(times, np.tile(0.02 * np.arange(5), 2)[-len(times) :], atol=1e-12)
     assert result.gait is None and "<iframe" in result.show()._repr_html_()
 
 
-def test_a_controller_makes_no_algebraic_loop_and_may_have_further_outputs(walking, refused):
+def test_a_controller_may_have_further_ports_and_makes_no_algebraic_loop(walking):
     robot = controlled_robot(walking)
-    springs = Springs(robot, {"lengths": 12, "rates": 12}, {"errors": 2, "signals": 4})
-    diagram = MakeTensegrityDiagram(robot, controller=springs)
-    found = diagram.GetOutputPort("signals").Eval(diagram.CreateDefaultContext())
-    np.testing.assert_allclose(found, robot.starting_cables().length, rtol=1e-12)
-
-
-def test_free_input_ports_of_a_controller_are_ports_of_the_diagram(walking):
-    robot = controlled_robot(walking)
-    controller = Springs(robot, {"lengths": 12, "wanted": 12}, {"signals": 4})
-    diagram = MakeTensegrityDiagram(robot, controller=controller)
-    context = diagram.CreateDefaultContext()
-    assert [diagram.get_input_port(i).get_name() for i in range(diagram.num_input_ports())] == [
-        "wanted"
-    ]
-    diagram.GetInputPort("wanted").FixValue(context, -robot.structure.initial_lengths)
+    ports = {"lengths": 12, "rates": 12, "wanted": 12}, {"errors": 2, "signals": 4}
+    diagram = MakeTensegrityDiagram(robot, controller=Springs(robot, *ports))
+    assert diagram.num_input_ports() == 1
+    context, structure = diagram.CreateDefaultContext(), robot.structure
+    diagram.GetInputPort("wanted").FixValue(context, -0.25 * structure.initial_lengths)
     found = diagram.GetOutputPort("signals").Eval(context)
-    np.testing.assert_allclose(found, np.zeros(4), atol=1e-15)
-
-
-def test_signals_from_outside_drive_as_those_of_a_controller(walking):
-    held = np.linspace(0.5, 4.0, 4)
-    p_WB, signals = bodies_at(0.08, controlled_robot(walking), EXPLICIT, held)
-    np.testing.assert_array_equal(signals, held)
-    short = shortly(walking, 0.08, engine=EXPLICIT)
-    result = simulate(short, controller=lambda time, readings: held, record=True)
-    np.testing.assert_allclose(p_WB, result.trajectory.p_WB[-1], atol=1e-7)
+    np.testing.assert_allclose(found, 0.75 * robot.starting_cables().length, rtol=1e-12)
 
 
 def test_a_robot_without_signals_needs_none():

@@ -16,6 +16,7 @@ from helpers.states import energy_and_momenta
 from helpers.structures import (
     driven_as_recorded,
     end_on_diagram,
+    motion_of,
     poses_of,
     simulated,
     thrown,
@@ -26,16 +27,13 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
-from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.drake import MakeSimulator
-from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces, compute_state_forces
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
@@ -53,8 +51,7 @@ def trajectory_of(robot: Robot, engine: str):
     """The trajectory of a robot from its start, on an engine, accurate if it has no settings."""
     changes = {"engine": ACCURATE.get(engine, engine), "friction.stiffness": "0 N/m"}
     robot = dataclasses.replace(robot, scenario=robot.scenario.with_changes(changes))
-    walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, 3))
-    return engine_of(robot.scenario).simulate(walk, record=True).trajectory
+    return motion_of(robot, seed=3)
 
 
 def on_a_spring(robot: Robot, times: np.ndarray) -> np.ndarray:
@@ -83,19 +80,13 @@ CROSSING += [((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))]
 def leaning() -> Robot:
     """A bar whose upper end is held, turned about it."""
     robot = Robot.of(scenario_of(SWINGING, duration=0.6))
-    c, s = np.cos(ANGLE), np.sin(ANGLE)
-    p_WB = robot.structure.p_WB @ [[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]
-    q_WB = np.array([[np.cos(0.5 * ANGLE), 0.0, np.sin(0.5 * ANGLE), 0.0]])
-    turned = dataclasses.replace(robot.structure, p_WB=p_WB, q_WB=q_WB)
-    return dataclasses.replace(robot, structure=turned)
+    return joined.turned(robot, {0: ANGLE}, {0: np.zeros((2, 3))})
 
 
 def as_a_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
     structure, lever = robot.structure, np.linalg.norm(robot.structure.p_BN[0])
     square = G * lever / (structure.unit_inertia[0, 0] + lever**2)
-    exact = {"t_eval": times, "rtol": 1e-10, "atol": 1e-12}
-    start, span = [ANGLE, 0.0], (0.0, times[-1])
-    angle = solve_ivp(lambda _, y: [y[1], -square * np.sin(y[0])], span, start, **exact).y[0]
+    angle = joined.swing(square, times, angle=ANGLE)
     place = 0.4 * np.stack([-np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=1)
     return np.stack([0.0 * place, place], axis=1)
 

@@ -34,22 +34,19 @@ def place(system, context):
     return system.GetOutputPort("state").Eval(context)[4]
 
 
-def monte_carlo(scenario, gait, seed, *, simulation=MonteCarloSimulation, until=0.0, **samples):
-    make = functools.partial(MakeDisturbedSimulator, scenario, gait)
-    given = {"make_simulator": make, "output": place, "final_time": until}
-    return simulation(generator=RandomGenerator(seed), **given | samples)
-
-
 def test_draws_differ_and_the_same_seed_gives_the_same_draws(scenario, gait):
-    runs = (monte_carlo(scenario, gait, seed, num_samples=4) for seed in (1, 1, 2))
-    first, again, other = ([one.output for one in run] for run in runs)
+    make = functools.partial(MakeDisturbedSimulator, scenario, gait)
+    first, again, other = (
+        [one.output for one in MonteCarloSimulation(make, place, 0.0, 4, RandomGenerator(seed))]
+        for seed in (1, 1, 2)
+    )
     assert len({*first, *other}) == 8
     assert first == again
 
 
 def test_a_random_simulation_ends_where_simulate_does(scenario, gait):
-    seed = 11
-    [draw] = fresh_draws(scenario, RandomGenerator(seed)(), 1)
+    make = functools.partial(MakeDisturbedSimulator, scenario, gait)
+    [draw] = fresh_draws(scenario, RandomGenerator(11)(), 1)
     result = simulate(disturbed(scenario, draw).on_engine("drake"), gait, record=True)
-    found = monte_carlo(scenario, gait, seed, simulation=RandomSimulation, until=0.3)
+    found = RandomSimulation(make, place, 0.3, RandomGenerator(11))
     assert found == pytest.approx(float(result.trajectory.p_WB[-1, 0, 0]), abs=1e-4)

@@ -1,12 +1,12 @@
 """The engine `mujoco`: the same robot as on the other engines, on ground of its own."""
 
-import json
 import math
 
 import numpy as np
 import pytest
 import xarray
 from helpers.converged import shortly
+from helpers.outcomes import assert_same
 
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.mjcf import loose_remark
@@ -20,7 +20,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.units import INCH, POUND_FORCE
 
 NO_BRISTLES = {"friction": Coulomb()}
 pytestmark = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
@@ -36,24 +35,6 @@ def short(scenario: Scenario) -> Scenario:
 def trajectory_of(scenario: Scenario) -> xarray.Dataset:
     """Of the seeded gait."""
     return simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
-
-
-def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, structure, data):
-    times = {"simulation.duration": "1.2 s", "simulation.steady_from": "1.0 s"}
-    resting = scenario.with_changes({"engine": "!Mujoco", **times})
-    end = trajectory_of(resting).isel(time=-1)
-    settled = json.loads((data / "expected.json").read_text())["settled"]
-    borne = float(end["normal_force"].sum()) / POUND_FORCE
-    assert borne == pytest.approx(settled["normal_sum_lbf"], rel=1e-3)
-    # Forces are on the nodes that are in the ground, by their depth.
-    height = end["p_WN"].sel(axis="z").values.ravel()[structure.contacts]
-    expected = scenario.ground.stiffness * np.maximum(-height, 0.0)
-    np.testing.assert_allclose(end["normal_force"], expected, atol=0.02 * expected.max())
-    np.testing.assert_array_equal(end["in_contact"], end["normal_force"] > 0.0)
-    spacing = np.diff(end["p_WB"].sel(axis="x")) / INCH
-    np.testing.assert_allclose(spacing, settled["spacing_in"], atol=0.05)
-    tip = float(end["p_WN"].sel(node="T5 tip", axis="z")) / INCH
-    assert tip == pytest.approx(settled["tip5_height_in"], abs=0.05)
 
 
 @pytest.mark.parametrize("name", ["thesis", "mast"])  # with weak and strong dampers
@@ -106,21 +87,12 @@ def test_many_gaits_walk_or_fail_as_each_alone(short, monkeypatch):
     monkeypatch.setattr(engine, "_STRETCH", 1000)
     short = short.with_changes({"simulation.max_speed": "0.07 m/s"})  # one of them exceeds it
     gaits = [seeded_gait(short, seed) for seed in range(3)]
-    alone: list[SimulationResult | Diverged] = []
-    for gait in gaits:
-        try:
-            alone.append(simulate(scenario=short, gait=gait, record=True))
-        except Diverged as failure:
-            alone.append(failure)
+    alone = [simulate_many(short, [gait], record=True)[0] for gait in gaits]
     assert {type(outcome) for outcome in alone} == {Diverged, SimulationResult}
     for workers in (1, 2):
         many = simulate_many(scenario=short, gaits=gaits, record=True, workers=workers)
         for found, expected in zip(many, alone, strict=True):
-            if isinstance(expected, Diverged):
-                assert (found.time, found.reason) == (expected.time, expected.reason)
-            else:
-                assert (found.metrics, found.integrator) == (expected.metrics, expected.integrator)
-                xarray.testing.assert_identical(found.trajectory, expected.trajectory)
+            assert_same(found, expected)
 
 
 def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure):
@@ -131,6 +103,7 @@ def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure
     weight = Robot.of(scenario).weight
     normal, friction = end["normal_force"].values, end["friction_force"].values
     assert normal.sum() == pytest.approx(weight * math.cos(angle), rel=1e-4)
+    np.testing.assert_array_equal(end["in_contact"], normal > 0.0)
     uphill = [weight * math.sin(angle), 0.0]
     np.testing.assert_allclose(friction.sum(axis=0), uphill, rtol=1e-3, atol=1e-9)
     # The law in stick, at each node: F = -c v.

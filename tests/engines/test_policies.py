@@ -1,7 +1,6 @@
 """Policies: their motion on the engines, and what evolution makes of their parameters."""
 
 import math
-from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -16,9 +15,8 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.policies import DrivenRobots, PolicyKind, driven_names
+from tetra_drake.scenario.policies import driven_names
 from tetra_drake.scenario.policy_kinds import imported_function
 
 DRAKE = "!Drake {scheme: runge_kutta3, accuracy: 1e-4, max_step: 2 ms}"
@@ -107,33 +105,3 @@ def test_a_policy_of_ones_own_is_found_by_its_import_path():
     result = simulate(scenario, td.seeded_gait(scenario))
     assert result.metrics.to_json() != simulate(scenario, Gait("", {"parameter 1": 0.0})).metrics
     assert imported_function("helpers.policies:own") is own
-
-
-class Given(PolicyKind):
-    """Policy whose answer and bounds are settings of the class."""
-
-    answer: ClassVar[Any] = None
-    bounds: ClassVar[tuple[float, float]] = 0.0, 1.0
-
-    def parameters(self, blueprint: Blueprint) -> dict[str, tuple[float, float]]:
-        return {"p": self.bounds}
-
-    def signals(self, robots: DrivenRobots, readings: Any, values: np.ndarray) -> Any:
-        return self.answer
-
-
-@pytest.mark.parametrize(
-    "answer", [None, "1", np.zeros((1, 5)), np.zeros((6, 1)), [[math.nan] * 6]]
-)
-def test_signals_of_a_kind_of_policy_are_numbers_for_each_cable(answer, monkeypatch, refused):
-    monkeypatch.setattr(Given, "answer", answer)
-    scenario = brief().with_sections(policy=Given())
-    with refused("!Given", "signals" + "[0, 0]" * isinstance(answer, list), "shape (1, 6)"):
-        simulate(scenario, Gait("", {"p": 0.0}))
-
-
-@pytest.mark.parametrize("bounds", [(1.0, 0.0), (0.0, math.nan), (-math.inf, 0.0)])
-def test_bounds_of_a_kind_of_policy_are_finite_and_ascend(bounds, monkeypatch, refused):
-    monkeypatch.setattr(Given, "bounds", bounds)
-    with refused("!Given", "p", "the least first"):
-        td.seeded_gait(brief().with_sections(policy=Given()))

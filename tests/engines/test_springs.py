@@ -15,12 +15,7 @@ from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 
 G, MASS, FREE = 9.80665, 0.5, 0.1
-SPRINGS = {
-    "coil": {"stiffness": 200.0, "initial_tension": 3.0, "max_tension": 10.0},
-    "hardening": {"stiffness": 100.0, "quadratic": 2e3, "cubic": 4e5},
-    "table": {"max_stretch": 0.1, "curve": {"stretch": [0.01, 0.03], "force": [1.0, 7.0]}},
-    "string": {"string": True, "stiffness": 2e4},
-}
+SPRINGS = TREES["springs"]["cables"]
 
 
 def pull(name: str, x: float) -> float:
@@ -38,21 +33,13 @@ def pull(name: str, x: float) -> float:
 
 def hung(engine: str) -> Scenario:
     """A mass on each spring, 20 mm above the end of the loose spring."""
-    loose = {"damping": 0.0, "free_length": FREE}
-    ends = {name: (f"h-{name}", f"m-{name}") for name in SPRINGS}
-    tree = {"nodes": {}, "cables": {}, "anchors": {}, "masses": {}}
-    for i, (name, (hook, mass)) in enumerate(ends.items()):
-        tree["nodes"] |= {hook: [0.2 * i, 0.0, 1.0], mass: [0.2 * i, 0.0, 0.9]}
-        tree["cables"][name] = loose | SPRINGS[name] | {"pairs": [[hook, mass]]}
-        tree["anchors"][hook], tree["masses"][mass] = "xyz", MASS
     changes = {"simulation.sample_period": "5 ms", "friction.stiffness": "0 N/m"}
-    resting = scenario_of(tree, duration=0.3, engine=engine, **changes)
+    resting = scenario_of(TREES["springs"], duration=0.3, engine=engine, **changes)
     lengths = Robot.of(resting).structure.initial_lengths
     offsets = [["0 m", "0 m", f"{x - FREE + 0.02!r} m"] for x in lengths.tolist()]
     return resting.with_changes({"robot.offsets": offsets})
 
 
-@pytest.mark.parametrize("engine", ["!Compiled", "!Drake", "!Mujoco"])
 def test_masses_fall_into_springs_and_are_thrown_back(engine):
     scenario = hung(engine)
     result = simulate(scenario, seeded_gait(scenario, 0), record=True)
@@ -138,44 +125,11 @@ def test_a_weight_on_a_string_goes_round_as_a_conical_pendulum():
     assert np.linalg.norm(v) == pytest.approx(speed, rel=1e-3)
 
 
-def test_two_masses_that_whirl_on_a_string_pull_with_their_centrifugal_force():
-    pair, pull = {"a": [-0.2, 0.0, 1.0], "b": [0.2, 0.0, 1.0]}, 0.5 * 2.0**2 / 0.2
-    groups = {"l": LINE | {"free_length": 0.4 - pull / 2e4, "pairs": [["a", "b"]]}}
-    moves = {"a": [0.0, -2.0, 0.0], "b": [0.0, 2.0, 0.0]}
-    masses = {"a": 0.5, "b": 0.5}
-    _, tension, v = ended(groups, pair, "", masses, moves=moves, gravity=0.0)
-    assert tension[0] == pytest.approx(pull, rel=1e-3)
-    np.testing.assert_allclose(np.linalg.norm(v, axis=1), 2.0, rtol=1e-3)
-
-
 def test_masses_that_a_damped_string_stops_from_parting_go_on_together():
     pair, line = {"a": [-0.1, 0.0, 1.0], "b": [0.1, 0.0, 1.0]}, {"damping": 2e4, "free_length": 0.4}
     groups, moves = {"l": LINE | line | {"pairs": [["a", "b"]]}}, {"b": [1.0, 0.0, 0.0]}
     _, _, v = ended(groups, pair, "", {"a": 0.3, "b": 0.1}, moves=moves, gravity=0.0)
     np.testing.assert_allclose(v[:, 0], 0.25, atol=5e-3)
-
-
-def test_of_coils_in_a_row_only_those_stretch_whose_initial_tension_is_borne():
-    groups = {
-        "soft": COIL | {"initial_tension": 1.0, "pairs": [["h", "m"]]},
-        "firm": COIL | {"initial_tension": 5.0, "pairs": [["m", "n"]]},
-    }
-    row = {"h": [0.0, 0.0, 1.0], "m": [0.0, 0.0, 0.9], "n": [0.0, 0.0, 0.8]}
-    length, tension, _ = ended(groups, row, "h", {"m": 0.01, "n": 0.3})
-    np.testing.assert_allclose(tension, [0.31 * G, 0.3 * G], rtol=1e-3)
-    np.testing.assert_allclose(length - FREE, [(0.31 * G - 1.0) / 200.0, 0.3 * G / 2e5], atol=1e-5)
-
-
-def test_coils_side_by_side_share_what_exceeds_both_initial_tensions():
-    groups = {
-        f"coil{i}": COIL | {"initial_tension": f, "stiffness": k, "pairs": [["h", "m"]]}
-        for i, (f, k) in enumerate([(1.0, 100.0), (3.0, 300.0)])
-    }
-    one = {"h": [0.0, 0.0, 1.0], "m": [0.0, 0.0, 0.9]}
-    length, tension, _ = ended(groups, one, "h", {"m": 1.0})
-    stretch = (G - 4.0) / 400.0
-    np.testing.assert_allclose(length - FREE, stretch, atol=1e-5)
-    np.testing.assert_allclose(tension, [1.0 + 100.0 * stretch, 3.0 + 300.0 * stretch], rtol=1e-3)
 
 
 def test_a_coil_that_bears_less_than_its_initial_tension_swings_as_a_rod():

@@ -10,7 +10,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers.anchored import BAR, TREES, floating_prism, scenario_of
+from helpers.anchored import BAR, floating_prism
 from helpers.kernels import Stepper
 from helpers.structures import (
     driven_as_recorded,
@@ -20,10 +20,9 @@ from helpers.structures import (
     simulated,
 )
 
-from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.kernels.packed import Packed
-from tetra_drake.laws.cable import LENGTH, PASSIVE
+from tetra_drake.laws.cable import LENGTH
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.laws.feedback import Gains, sense
 from tetra_drake.laws.forces import Forces
@@ -35,7 +34,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.scenario.scenario import Scenario
 
 AMPLITUDE, FREQUENCY, INTERVAL = 1.5, 2.0 * np.pi, 0.5  # N, rad/s, s between recorded centres
 
@@ -71,55 +69,23 @@ def test_driven_structures_move_as_the_independent_simulation(name, data):
     np.testing.assert_allclose(there, expected, atol=1e-5)
 
 
-def row_as_kind(row: Robot) -> StructureFile:
-    """The row of tetrahedra as a structure file has it."""
-    law, structure = row.scenario.robot, row.structure
-    names = [name.replace(" ", "_") for name in structure.node_names]
-    p_WN = node_positions(structure, structure.initial_state).tolist()
-    springs = {"outer": law.cables.outer_stiffness, "inner": law.cables.inner_stiffness}
-    laws = {"damping": law.cables.damping, "free_length": law.cables.free_length}
-    cables = {name: {"pairs": [], "stiffness": k, **laws} for name, k in springs.items()}
-    oscillators = [name.replace(" ", "_") for name in structure.oscillators]
-    actuated: dict[str, list[str]] = {name: [] for name in oscillators}
-    for name, cable in zip(structure.cable_names, structure.cables, strict=True):
-        group, pair = name.split()[1], [names[cable["node_a"]], names[cable["node_b"]]]
-        cables[group]["pairs"].append(pair)
-        if cable["signal"] != PASSIVE:
-            actuated[oscillators[cable["signal"]]].append(" ".join([group, *pair]))
-    strut = {"density": law.density, "diameter": law.strut_diameter, "contact_radius": 0.0}
-    strut |= {"pairs": [[names[a], names[b]] for a, b in structure.struts]}
-    strut |= {"node_diameter": law.node_diameter}
-    tree = {"struts": {"strut": strut}, "cables": cables, "actuated": actuated}
-    tree["nodes"] = dict(zip(names, p_WN, strict=True))
-    contacts = [names[i] for i in structure.contacts]
-    return StructureFile(**tree, contacts=contacts, gravity=law.gravity)
-
-
 BRIEF = {"cpg.start_up": "0.2 s", "simulation.duration": "1 s", "simulation.steady_from": "0.4 s"}
 
 
-@pytest.mark.parametrize(("scenario_name", "allowed"), [("coulomb", 1e-9), ("thesis", 1e-6)])
-def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_name, allowed):
-    # Seen: 5e-11 m, as nodes at height 0 are in the ground by rounding or not; where moments of
-    # inertia are general, too, 1e-10 m, and 8e-8 m on the thesis's friction, which enlarges that.
-    row = Robot.of(load_scenario(scenario_name).on_engine("compiled").with_changes(BRIEF))
-    written = row.scenario.with_sections(robot=row_as_kind(row))
-    alike = Robot.of(written)  # at rest; the row starts where it is balanced
-    start = {"p_WB": row.structure.p_WB, "q_WB": row.structure.q_WB}
-    alike = dataclasses.replace(alike, structure=dataclasses.replace(alike.structure, **start))
-    assert alike.model.isotropic
-    general = dataclasses.replace(alike, model=alike.model._replace(isotropic=False))
-    expected = poses_of(simulated(row)[1].states)
-    assert np.ptp(expected[..., 4:], axis=0).max() > 0.003, "it walks"
-    for robot in (alike, general):
-        poses = poses_of(simulated(robot)[1].states)
-        np.testing.assert_allclose(poses[..., 4:], expected[..., 4:], rtol=0, atol=allowed)
+def test_equal_moments_of_inertia_walk_as_any_moments(scenario):
+    # Seen: 8e-8 m, as nodes at height 0 are in the ground by rounding or not.
+    row = Robot.of(scenario.on_engine("compiled").with_changes(BRIEF))
+    general = dataclasses.replace(row, model=row.model._replace(isotropic=False))
+    assert row.model.isotropic
+    poses, others = (poses_of(simulated(each)[1].states) for each in (row, general))
+    assert np.ptp(poses[..., 4:], axis=0).max() > 0.003, "it walks"
+    np.testing.assert_allclose(others[..., 4:], poses[..., 4:], rtol=0, atol=1e-6)
 
 
 def felt(robot: Robot, *, longer: float = 1.0, pushes: float = 0.0, **gains: float):
     """(oscillators, 2): the feedback to extensor and flexor of a robot in its pose of rest, whose
     cables are longer by a factor, and whose contacts near the ground bear some force in N each."""
-    structure, state = robot.structure, robot.structure.initial_state
+    structure, state = robot.structure, robot.equilibrium.state
     p_WN = node_positions(structure, state)
     along = p_WN[structure.cables["node_a"]] - p_WN[structure.cables["node_b"]]
     forces, feedback = Forces.of(robot.model), np.empty(2 * structure.signals)
@@ -132,10 +98,14 @@ def felt(robot: Robot, *, longer: float = 1.0, pushes: float = 0.0, **gains: flo
     return feedback.reshape(-1, 2)
 
 
-@pytest.mark.parametrize("name", ["prism", "six_bar", "mast", "pair"])
-def test_oscillators_feel_longer_cables_and_what_their_bodies_bear(name):
+GROUPS = {"robot.actuation": [["outer bottom_left", "outer bottom_right"], ["inner top"]]}
+FELT = [("thesis", GROUPS), *((name, {}) for name in ("prism", "six_bar", "mast", "pair"))]
+
+
+@pytest.mark.parametrize(("name", "changes"), FELT)
+def test_oscillators_feel_longer_cables_and_what_their_bodies_bear(name, changes):
     live = {"cpg.signals": "live", "cpg.feedback": ["length", "load"]}
-    robot = Robot.of(load_scenario(name).with_changes(live))
+    robot = Robot.of(load_scenario(name).with_changes(live | changes))
     # 10 % longer, times the gain: 0.05 on the extensor, however many cables a group has.
     for longer, expected in ((1.0, 0.0), (1.1, 0.05)):
         found = felt(robot, length=0.5, longer=longer)
@@ -156,51 +126,29 @@ def test_a_structure_walks_as_far_as_its_centre_of_mass():
     assert abs(float(way.mean("body")[0]) - x) > 1e-4, "the mean of the bodies goes another way"
 
 
-LYING_BAR = {"nodes": {"a": [0.0, 0.0, 0.0], "b": [0.2, 0.0, 0.0]}, "struts": {"bar": BAR}}
-LIFTED_BAR = LYING_BAR | {"offsets": [[0.0, 0.0, 0.02]]}
+LIFTED_BAR = {
+    "nodes": {"a": [0.0, 0.0, 0.0], "b": [0.2, 0.0, 0.0]},
+    "struts": {"bar": BAR},
+    "offsets": [[0.0, 0.0, 0.02]],
+}
+UNDRIVEN = {
+    "a pair whose cables nothing drives": ("pair", {"robot.actuated": {}}),
+    "a body without cables": ("prism", {"robot": StructureFile.model_validate(LIFTED_BAR)}),
+}
 
 
-@pytest.fixture(params=["pair", "body"])
-def undriven(request) -> Scenario:
-    """A pair whose cables nothing drives, or a body without cables, 2 cm above the ground."""
-    brief = BRIEF | {"simulation.duration": "0.7 s"}
-    if request.param == "pair":
-        return load_scenario("pair").with_changes(brief | {"robot.actuated": {}})
-    prism = load_scenario("prism").with_changes(brief)
-    return prism.with_sections(name="body", robot=StructureFile.model_validate(LIFTED_BAR))
-
-
+@pytest.mark.parametrize(("name", "changes"), UNDRIVEN.values(), ids=UNDRIVEN)
 @pytest.mark.parametrize("signals", ["listing", "live"])
-def test_a_robot_that_nothing_drives_falls_and_rests(undriven, signals):
-    scenario = undriven.with_changes({"cpg.signals": signals})
-    gait = seeded_gait(scenario)
-    result = simulate(scenario, gait, record=True)
-    robot, trajectory = Robot.of(scenario), result.trajectory
+def test_a_robot_that_nothing_drives_falls_and_rests(engine, name, changes, signals):
+    brief = BRIEF | {"simulation.duration": "0.7 s", "cpg.signals": signals}
+    changes = brief | {"engine": engine, "friction.stiffness": "0 N/m"} | changes
+    scenario = load_scenario(name).with_changes(changes)
+    (result,) = simulate_many(scenario, [seeded_gait(scenario)], record=True)
+    robot, end = Robot.of(scenario), result.trajectory.isel(time=-1)
     heights = node_positions(robot.structure, robot.equilibrium.state)[:, 2]
-    np.testing.assert_allclose(trajectory.p_WN[-1, :, 2], heights, atol=1e-5)
-    assert float(trajectory.normal_force[-1].sum()) == pytest.approx(robot.weight, rel=1e-3)
+    np.testing.assert_allclose(end.p_WN.sel(axis="z"), heights, atol=1e-5)
+    assert float(end.normal_force.sum()) == pytest.approx(robot.weight, rel=1e-3)
     assert result.metrics.actuator_work == result.metrics.signal_rate == 0.0
-    for outcome in simulate_many(scenario, [gait, gait]):
-        assert repr(outcome.metrics) == repr(result.metrics)
-    diagram = simulate(scenario.with_changes({"engine": "!Drake"}), gait, record=True)
-    np.testing.assert_allclose(diagram.trajectory.p_WN, trajectory.p_WN, atol=1e-4)
-    if installed() and signals == "listing":
-        changes = {"engine": "!Mujoco", "friction.stiffness": "0 N/m"}
-        fallen = simulate(scenario.with_changes(changes), gait, record=True).trajectory
-        np.testing.assert_allclose(fallen.p_WN[-1, :, 2], heights, atol=1e-5)
-
-
-def test_parallel_cables_add_and_a_load_needs_no_strut(engine):
-    changes = {"engine": engine, "friction.stiffness": "0 N/m"}
-    scenario = scenario_of(TREES["two_ropes"]).with_changes(BRIEF | changes)
-    g, robot = scenario.robot.gravity, Robot.of(scenario)
-    assert robot.equilibrium.lengths == pytest.approx([0.98 + g / 1000.0] * 2)
-    trajectory = simulate(scenario, seeded_gait(scenario), record=True).trajectory
-    rise = 0.005 * np.cos(np.sqrt(1000.0) * trajectory.time.values)
-    heights = 2.0 - 0.98 - g / 1000.0 + rise
-    np.testing.assert_allclose(trajectory.p_WB[:, 0, 2], heights, atol=5e-5)
-    tension = g - 1000.0 * rise[:, np.newaxis] * [1.0, 1.0]
-    np.testing.assert_allclose(trajectory.tension / [0.6, 0.4], tension, atol=0.05)
 
 
 def test_what_a_structure_lacks_is_null_in_its_result(tmp_path):

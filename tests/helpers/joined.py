@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from verification import completed
+from verification_references import formula
 
-from helpers.anchored import BAR, TREES, scenario_of, supported_prism
+from helpers.anchored import TREES, scenario_of, supported_prism
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.scenario import Scenario
 
 G = 9.80665
@@ -24,20 +28,7 @@ ATWOOD, STRING, DOUBLE, HINGED, RHOMBUS = (
 def with_arm(**changes: object) -> Scenario:
     """The shipped prism on supports, with an arm on a ball joint and a driven cable over a ring at
     the arm's end."""
-    prism = supported_prism().robot.model_dump()
-    shoulder = prism["nodes"]["n3"]
-    hand = [shoulder[0] + 0.06, shoulder[1] + 0.02, shoulder[2] + 0.05]
-    arm = BAR | {"pairs": [["s", "h"]]}
-    rope = {"pairs": [["n0", "h", "n4"]], "stiffness": 200.0, "damping": 1.0, "tension": 4.0}
-    tree = prism | {
-        "nodes": prism["nodes"] | {"s": shoulder, "h": hand},
-        "struts": prism["struts"] | {"arm": arm},
-        "cables": prism["cables"] | {"rope": rope},
-        "joints": {"shoulder": {"nodes": ["n3", "s"]}},
-        "bodies": {"arm": {"struts": ["arm"], "mass": 0.03, "inertia": [4e-5, 3e-5, 2e-5]}},
-        "actuated": prism["actuated"] | {"rope": ["rope n4 h n0"]},
-    }
-    return scenario_of(tree, **changes)
+    return scenario_of(merged(supported_prism().robot.model_dump(), TREES["arm"]), **changes)
 
 
 def released() -> Robot:
@@ -114,33 +105,26 @@ def folded(duration: float = 0.4) -> Robot:
 
 def as_a_double_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
     """Lagrange's equations of two bars, for their angles from the vertical."""
-    m, n = robot.structure.mass
-    i, j = robot.structure.mass * robot.structure.unit_inertia[:, 0]
-
-    def rate(_: float, y: np.ndarray) -> np.ndarray:
-        a, b, a_rate, b_rate = y
-        across = 0.5 * n * UPPER * LOWER
-        mixed, bent = across * np.cos(a - b), across * np.sin(a - b)
-        inertia = [
-            [i + 0.25 * m * UPPER**2 + n * UPPER**2, mixed],
-            [mixed, j + 0.25 * n * LOWER**2],
-        ]
-        force = [
-            -bent * b_rate**2 - (0.5 * m + n) * G * UPPER * np.sin(a),
-            bent * a_rate**2 - 0.5 * n * G * LOWER * np.sin(b),
-        ]
-        return np.concatenate([y[2:], np.linalg.solve(inertia, force)])
-
-    start, span = [*LEANS, 0.0, 0.0], (0.0, times[-1])
-    upper, lower = solve_ivp(rate, span, start, t_eval=times, **EXACT).y[:2]
+    problem, (a, b) = completed("double_pendulum"), LEANS
+    states = problem["states"] | {"a": [a, "a_rate"], "b": [b, "b_rate"]}
+    upper, lower = formula(times, problem | {"states": states, "known": "array([a, b])"})
     knee = UPPER * along(upper)
     return np.stack([0.0 * knee, knee, knee, knee + LOWER * along(lower)], axis=1)
 
 
-def ajar() -> Robot:
+def ajar(tree: dict[str, Any] = HINGED, duration: float = 0.5, **changes: object) -> Robot:
     """The triangle on its hinge, turned by 0.5 rad."""
-    robot = Robot.of(scenario_of(HINGED, duration=0.5))
+    robot = Robot.of(scenario_of(tree, duration, **changes))
     return turned(robot, {1: LEANS[0]}, {1: np.tile([0.0, 0.0, 1.0], (2, 1))})
+
+
+def swing(square: float, times: np.ndarray, *, angle: float, rate: float = 0.0) -> np.ndarray:
+    """Angles (times,) of a pendulum, a'' = -square sin a, from an angle (rad) and a rate (rad/s) at
+    time 0."""
+    given = {"t_eval": times, **EXACT}
+    return solve_ivp(
+        lambda _, y: [y[1], -square * np.sin(y[0])], (0.0, times[-1]), [angle, rate], **given
+    ).y[0]
 
 
 def as_a_flap(robot: Robot, times: np.ndarray) -> np.ndarray:
@@ -149,10 +133,7 @@ def as_a_flap(robot: Robot, times: np.ndarray) -> np.ndarray:
     hinge = structure.node_names.index("c")
     lever = structure.p_BN[hinge, 2]
     square = G * lever / (structure.unit_inertia[1, 1] + lever**2)
-    span, start = (0.0, times[-1]), [LEANS[0], 0.0]
-    angle = solve_ivp(
-        lambda _, y: [y[1], -square * np.sin(y[0])], span, start, t_eval=times, **EXACT
-    ).y[0]
+    angle = swing(square, times, angle=LEANS[0])
     moved = np.tile(structure.p_WN, (len(times), 1, 1))
     moved[:, structure.node_names.index("e")] = [0.0, 0.0, 1.0] + 0.3 * along(angle)
     for node in ("a", "b", "c", "d"):

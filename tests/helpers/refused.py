@@ -24,6 +24,7 @@ from helpers.brief import BRIEF
 from helpers.controllers import OwnGround, Springs
 from helpers.converged import shortly
 from helpers.made_up_walk import make_walk
+from helpers.policies import Given
 from helpers.rod import LAW, rod_with_tendons
 from tetra_drake.engines.drake import MakeDisturbedSimulator
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
@@ -73,6 +74,13 @@ def simulated(name: str, changes: Any = None, **drive: Any):
 
 def brief(name: str, changes: Any):
     return scenario(name, BRIEF | changes)
+
+
+def answered(answer: Any = None, bounds: tuple[float, float] = (0.0, 1.0)):
+    """A simulation by a policy with this answer, within these bounds of its parameter."""
+    Given.answer, Given.bounds = answer, bounds
+    chosen = brief("prism", {}).with_sections(policy=Given())
+    simulate(chosen, td.seeded_gait(chosen))
 
 
 def steered(steering: Any):

@@ -1,7 +1,6 @@
 """States of the robot to test forces and rates on, and the velocities in a trajectory."""
 
 import numpy as np
-import xarray
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import RotationalInertia
@@ -11,16 +10,6 @@ from tetra_drake.laws.model import Model
 from tetra_drake.laws.struts import least_strut_distance
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
-
-
-def body_velocities(walk: xarray.Dataset, structure: Structure) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity (m/s) and angular velocity (rad/s) of the bodies, (time, n, 3) each, from the nodes:
-    sum r x (w x r) = 8/3 r^2 w."""
-    bodies = len(structure.bodies)
-    p_WN, v_WN = (walk[name].values.reshape(-1, bodies, 4, 3) for name in ("p_WN", "v_WN"))
-    v_WB = v_WN.mean(axis=2)
-    p_BN, v_BN = p_WN - walk.p_WB.values[:, :, None], v_WN - v_WB[:, :, None]
-    return v_WB, np.cross(p_BN, v_BN).sum(axis=2) / (8 / 3 * (structure.p_BN[0] ** 2).sum())
 
 
 def disturbed(structure: Structure, seed: int, *, pose: float, speed: float) -> np.ndarray:

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
+from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
@@ -26,6 +28,12 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
     """The robot whose bodies move at t = 0, with angular velocities (rad/s) and velocities (m/s)
     (bodies, 6)."""
     return dataclasses.replace(robot, structure=dataclasses.replace(robot.structure, v_WB=v_WB))
+
+
+def motion_of(robot: Robot, *, seed: int = 0) -> xarray.Dataset:
+    """The trajectory of a robot that walks by a seeded gait on the engine of its scenario."""
+    walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, seed))
+    return engine_of(robot.scenario).simulate(walk, record=True).trajectory
 
 
 def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:

@@ -16,10 +16,12 @@ from pytest import approx
 
 from tetra_drake.cli import main
 from tetra_drake.engines.mjcf import make_mjcf
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.bridges.conversion import converted
 from tetra_drake.lab.bridges.formats import save_structure
 from tetra_drake.lab.study.equilibrium import robot_of_file, robot_of_structure
 from tetra_drake.laws.kinematics import V_WN
+from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import moved_nodes
 from tetra_drake.scenario.load import load_scenario
@@ -171,6 +173,43 @@ def test_what_a_model_has_disabled_is_nothing(tmp_path: Path) -> None:
     for flag in ("limit", "constraint"):
         file.write_text(file.read_text().replace("gravity=", f'{flag}="disable" gravity='))
         assert "limited" not in str(converted(file).ignored)
+
+
+def lost_of(x: Any) -> np.ndarray:
+    """Losses of angle (rad) in the last half swings of the pendulum, from the x of its tip."""
+    angle = np.arcsin(np.abs(x) / 0.4)
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(angle))) < 0) + 1
+    return -np.diff(angle[turns])[-3:]
+
+
+def swung(model: Any) -> np.ndarray:
+    """Losses in MuJoCo, from the start, in 3 s."""
+    data, x = mujoco.MjData(model), list[float]()
+    while data.time < 3.0:
+        mujoco.mj_step(model, data)
+        x.append(data.site("tip").xpos[0])
+    return lost_of(x)
+
+
+def test_a_ball_joint_has_its_friction_here_and_in_mujoco(tmp_path: Path) -> None:
+    file, expected = tmp_path / "a.xml", approx(2.0 * 1e-3 / (0.1 * 10.0 * 0.4), rel=0.01)
+    file.write_text(TEXTS["pendulum"])
+    assert swung(mujoco.MjModel.from_xml_path(str(file))) == expected
+    tree = converted(file).model_dump() | {"start": {"rest": False}}
+    settings = {"simulation.sample_period": "2 ms", "friction.stiffness": "0 N/m"}
+    settings["engine"] = "!Compiled {tolerance: 1e-7 m/s}"
+    scenario = scenario_of(tree, duration=3.0, **settings)
+    found = simulate(scenario, seeded_gait(scenario), record=True).trajectory
+    assert lost_of(found.p_WN.sel(node="tip", axis="x").values) == expected
+    robot = Robot.of(scenario.with_changes({"engine": "!Mujoco"}))
+    assert swung(model_of(robot)) == expected
+    file.write_text(make_mjcf(robot))
+    (joint,) = converted(file).joints.values()
+    assert joint.friction == 1e-3
+    file.write_text(TEXTS["pendulum"].replace("<freejoint/>", ""))
+    anchored = converted(file)
+    assert (anchored.joints, anchored.anchors["pin-1"]) == ({}, "xyz")
+    assert any("friction" in told and "pin" in told for told in anchored.ignored)
 
 
 def test_a_limited_tendon_is_a_stiff_cable(tmp_path: Path) -> None:

@@ -14,13 +14,15 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 PERIODS, SAVED, CUT = 10, 6, "T1-T2 outer bottom_left"
+PUSH = {"at": "0.05 s", "push": {"impulse": ["0 N*s", "0 N*s", "2 mN*s"], "on": "T1"}}
 
 
 @pytest.fixture
 def walk() -> Scenario:
-    """0.2 s of two disturbed tetrahedra with winches; the front loses its load."""
+    """0.2 s of two disturbed tetrahedra with winches; one is pushed, and the front loses its
+    load."""
     changes = {"robot.tetrahedra": 2, "friction.stiffness": "0 N/m"}
-    changes |= {"robot.payload": ["0 g", "3 g"], "events": [{"at": "0.11 s", "lose": ["T2"]}]}
+    changes |= {"robot.payload": ["0 g", "3 g"], "events": [PUSH, {"at": "0.11 s", "lose": ["T2"]}]}
     changes |= WINCH | {"disturbances": {"draws": 1, "start": 0.01}}
     return shortly(load_scenario("coulomb"), 0.2, **changes)
 
@@ -69,9 +71,10 @@ def test_a_robot_branches_and_a_copy_replays_it(walk):
 
 def test_damage_is_an_events_cut_at_the_same_time_and_goes_with_the_state(walk):
     cut = {"at": f"{SAVED * walk.simulation.control_period} s", "cut": [CUT]}
-    told = walk.with_sections(events=[])
-    planned, free = told.with_changes({"events": [cut]}), Simulation(told, count=2, record=True)
+    told = walk.with_changes({"events": [PUSH]})
+    planned = told.with_changes({"events": [PUSH, cut]})
     expected = Simulation(planned, record=True)
+    free = Simulation(told, count=2, record=True)
     go(expected, range(SAVED))
     go(free, range(SAVED))
     free.damage(1, cables=[CUT])

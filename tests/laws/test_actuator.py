@@ -48,23 +48,6 @@ def test_tension_and_winding_satisfy_both_of_their_equations():
     assert len(seen) >= 6, "regimes"
 
 
-def test_tension_and_winding_have_no_jumps():
-    # From each random place a small way into a random direction.
-    generator, way = np.random.default_rng(1), 1e-7
-    for place in random_pulls():
-        near = (np.array(place) + way * generator.uniform(-1.0, 1.0, 4)).tolist()
-        for law in (wind, pull):
-            before = law(place[0], place[1], rate=place[2], signal=place[3])
-            after = law(near[0], near[1], rate=near[2], signal=near[3])
-            # 5 N s/m / 50 ms + 100 N/m is the most that a tension changes per m.
-            assert after.tension == pytest.approx(before.tension, abs=300.0 * way)
-            # A command that changes by 100 N/m, per 50 ms, is the most of a tension motor.
-            assert after.rate == pytest.approx(before.rate, abs=3000.0 * way)
-    # The place where a winch arrives.
-    just_before, there = (wind(drive, 0.1, signal=30.0) for drive in (0.05 + way, 0.05))
-    assert just_before.tension == pytest.approx(there.tension, abs=300.0 * way)
-
-
 def test_the_slope_is_the_derivative_of_the_tension_by_the_rate():
     step, slopes = 1e-6, set()
     for drive, length, rate, signal in random_pulls():

@@ -129,16 +129,6 @@ def test_beyond_the_limit_a_node_that_moves_back_stays_stuck(sliding, way):
     assert sliding.margin(1e-5 * np.array(way), p=p) < 0.0
 
 
-def test_a_node_that_sticks_again_does_so_where_it_is(sliding):
-    assert sliding.update((0.02, 0.0, 0.0), (1e-3, 0.0, -1e-4)), "breaks free"
-    np.testing.assert_allclose(sliding.modes[:-1, MODE : MODE + 2], [[1.0, 0.0]] * 10, atol=1e-9)
-    slow, there = (1e-3, 0.0, 0.0), (5e-3, 1e-3, -1e-4)
-    assert sliding.update(slow, there), "70 * 1e-3 N is below 0.5 * 0.44 N"
-    assert not sliding.modes[:, MODE : MODE + 2].any()
-    _, ground_forces = sliding.forces(slow, there)
-    np.testing.assert_allclose(ground_forces[:-1, :2], [[-0.07, 0.0]] * 10, atol=1e-9)
-
-
 def test_the_heading_is_that_of_the_body_at_touchdown(sliding):
     np.testing.assert_allclose(sliding.modes[:-1, HEADING : HEADING + 2], [[1.0, 0.0]] * 10)
     # By 0.6 about z, after the nose has gone down by 0.4.

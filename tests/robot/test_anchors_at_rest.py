@@ -32,19 +32,6 @@ def guyed_mast(scale: float = 1.0, **changes: object) -> dict[str, object]:
     } | changes
 
 
-def test_a_held_bar_swings_at_the_frequency_of_a_physical_pendulum():
-    robot = Robot.of(scenario_of(SWINGING))
-    structure, study = robot.structure, study_equilibrium(robot)
-    mass, lever = structure.mass[0], np.linalg.norm(structure.p_BN[0])
-    moment = mass * (structure.unit_inertia[0, 0] + lever**2)
-    swing = math.sqrt(mass * G * lever / moment) / (2.0 * math.pi)
-    assert study.frequencies[:2] == pytest.approx([swing, swing], rel=1e-5)
-    assert study.statics.mechanisms == 2
-    # The anchor bears the weight by giving way.
-    assert study.nodes.z["a"] == pytest.approx(-mass * G / 1e6, rel=1e-6)
-    assert study.nodes.anchor_z["a"] == pytest.approx(mass * G, rel=1e-6)
-
-
 def test_reactions_balance_loads_and_weight():
     robot = Robot.of(supported_prism())
     study = study_equilibrium(robot)

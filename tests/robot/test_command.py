@@ -9,13 +9,6 @@ from tetra_drake.robot.command_file import command_columns
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 
-
-def counting(cables: int = 8, samples: int = 3) -> Command:
-    """Sample k of cable i is 10 k + i."""
-    values = 10.0 * np.arange(samples)[:, np.newaxis] + np.arange(cables)
-    return Command("counting", 0.01, values)
-
-
 HELD = [(0.0005, 20, 21)]  # on the grid
 HELD += [(0.004, 3, 4)]  # within the step from 8 to 12 ms
 
@@ -23,7 +16,8 @@ HELD += [(0.004, 3, 4)]  # within the step from 8 to 12 ms
 @pytest.mark.parametrize(("step", "before", "after"), HELD)
 def test_a_sample_is_held_for_ten_milliseconds_and_the_last_for_ever(scenario, step, before, after):
     changed = scenario.with_changes({"cpg.listing_step": f"{step} s"})
-    held = driven_robot(changed, counting()).samples[:, 0]
+    command = Command("steps", 0.01, np.outer([0.0, 10.0, 20.0], np.ones(8)))
+    held = driven_robot(changed, command).samples[:, 0]
     assert (held[0], held[before], held[after], held[-1]) == (0.0, 0.0, 10.0, 20.0)
     assert len(held) * step > changed.simulation.duration + step
 

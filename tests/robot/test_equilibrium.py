@@ -18,19 +18,15 @@ from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, TIP
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
 
-def resting_nodes(robot: Robot) -> np.ndarray:
-    """(nodes, 3) in m."""
-    return node_positions(robot.structure, robot.equilibrium.state)
-
-
 def test_rests_where_the_independent_simulation_does(robot, data):
     # Its normal forces are 7e-6 off our weight (the digits of its mass, and what still moved).
     expected = json.loads((data / "expected.json").read_text())["settled"]
-    p_WN = resting_nodes(robot) / INCH
+    nodes = node_positions(robot.structure, robot.equilibrium.state)
+    p_WN = nodes / INCH
     spacing = np.diff(p_WN[BOTTOM_LEFT::4, 0])
     np.testing.assert_allclose(spacing, expected["spacing_in"], rtol=1e-5)
     assert p_WN[4 * 4 + TIP, 2] == pytest.approx(expected["tip5_height_in"], rel=1e-5)
-    depth = np.maximum(0.0, -resting_nodes(robot)[robot.structure.contacts, 2])
+    depth = np.maximum(0.0, -nodes[robot.structure.contacts, 2])
     normal = robot.scenario.ground.stiffness * depth / POUND_FORCE
     atol = 1e-5 * expected["normal_sum_lbf"]
     np.testing.assert_allclose(normal, expected["normals"], atol=atol)

@@ -1,29 +1,11 @@
 """The network of a gait: who inhibits whom, what steering and feedback are made of."""
 
 import numpy as np
-import pytest
+from helpers.actuations import SIDES
 
 from tetra_drake.laws.matsuoka import connections
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import signal_samples
-
-SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
-
-
-@pytest.mark.parametrize(("low", "high", "swings"), [(0.0, 1.99, True), (2.01, 3.4, False)])
-def test_two_oscillators_silence_each_other_with_weights_above_two(scenario, low, high, swings):
-    """An extensor and the other oscillator's flexor settle at y = u0 / (1 + beta); the two others
-    stay silent where (partner weight + w) y > u0, so where w > 1 + beta - partner weight."""
-    bounds = {"gait_bounds.weight_min": low, "gait_bounds.weight_max": high}
-    two = scenario.with_changes({"robot.tetrahedra": 3, "simulation.duration": "40 s"} | bounds)
-    robot, still = Robot.of(two), two.cpg.external_input / (1.0 + two.cpg.self_inhibition_weight)
-    for seed in range(20):
-        late = signal_samples(robot, seeded_gait(two, seed))[-10_000:] / two.cpg.gain
-        if swings:
-            assert (np.ptp(late, axis=0) > 0.1).all()
-        else:
-            np.testing.assert_allclose(np.abs(late), still, rtol=1e-3)
 
 
 def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
@@ -48,20 +30,3 @@ def test_a_turn_strengthens_the_left_by_what_it_weakens_the_right(scenario):
     np.testing.assert_array_equal(tonic[0], u0)
     once = np.repeat([1.4, 1.0, 0.6], 2)  # extensor and flexor of left, middle, right
     np.testing.assert_allclose(tonic[1], u0 * np.tile(once, 2), rtol=1e-15)
-
-
-def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
-    # Group sizes 2 and 1: a group's elongation is the mean over its cables.
-    actuation = [["outer bottom_left", "outer bottom_right"], ["inner top"]]
-    pathways = {"cpg.signals": "live", "cpg.feedback": ["length", "load", "pitch"]}
-    other = scenario.with_changes({"robot.actuation": actuation} | pathways)
-    senses = Robot.of(other).senses
-    assert senses.drivers[:6].tolist() == [0, 0, -1, -1, -1, 1]
-    assert senses.drivers[6:12].tolist() == [2, 2, -1, -1, -1, 3]
-    assert senses.ahead.tolist() == [1, 1, 2, 2, 3, 3, 4, 4]
-    driven = senses.drivers >= 0
-    per_cable = (senses.per_length * senses.neutral_length)[driven]
-    np.testing.assert_allclose(per_cable, [0.5, 0.5, 1.0] * 4, rtol=1e-14)
-    # Five tetrahedra of 20.29 g weigh 5 * 0.02029 kg * 9.80665 m/s^2 = 0.9949 N.
-    assert 1.0 / senses.per_load[0] == pytest.approx(0.9949, rel=1e-3)
-    assert senses.carriers.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]

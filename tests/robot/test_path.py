@@ -1,11 +1,10 @@
 """The path of the centre: its curvature and the heading along it."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
-from helpers.prism import make_prism
+from scipy.spatial.transform import Rotation
 
 from tetra_drake.laws.curves import curvature
 from tetra_drake.robot.measures import follow
@@ -49,35 +48,19 @@ def test_a_robot_that_stands_has_no_curvature():
     assert abs(curvature(circle(np.linspace(0.0, 3 * TURN, 50), 1e-3))) < 0.01  # sways in circles
 
 
-def poses(headings, pitch=0.3, bodies=3):
-    """(k, bodies, 7): bodies a third of a metre apart along the heading, pitched differently."""
-    about_z = np.outer(headings, np.ones(bodies)) / 2.0
-    about_y = np.outer(np.ones(len(headings)), np.linspace(-pitch, pitch, bodies)) / 2.0
-    states = np.zeros((len(headings), bodies, 7))
-    states[..., 0] = np.cos(about_z) * np.cos(about_y)  # turned about z after pitching about y
-    states[..., 1] = -np.sin(about_z) * np.sin(about_y)
-    states[..., 2] = np.cos(about_z) * np.sin(about_y)
-    states[..., 3] = np.sin(about_z) * np.cos(about_y)
-    states[..., 4] = np.cos(headings)[:, None] * np.arange(bodies) / 3.0
-    states[..., 5] = np.sin(headings)[:, None] * np.arange(bodies) / 3.0
-    states[..., 6] = [0.0, 0.0, 0.3]
-    return states
-
-
 @pytest.mark.parametrize("turns", [1.7, -1.7])
 def test_the_heading_of_a_row_counts_whole_turns_and_its_centre_is_that_of_mass(turns):
     row = Robot.of(load_scenario("thesis").with_changes({"robot.tetrahedra": 3})).structure
     headings = np.linspace(0.4, 0.4 + turns * TURN, 30)
-    path = follow(np.arange(30.0), poses(headings), row)
+    poses, along = np.zeros((30, 3, 7)), np.arange(3) / 3.0
+    for body, pitch in enumerate((-0.3, 0.0, 0.3)):  # turned about z after pitching about y
+        angles = np.stack([headings, np.full(30, pitch)], axis=1)
+        poses[:, body, :4] = Rotation.from_euler("ZY", angles).as_quat()[:, [3, 0, 1, 2]]
+    poses[..., 4] = np.outer(np.cos(headings), along)
+    poses[..., 5] = np.outer(np.sin(headings), along)
+    poses[..., 6] = [0.0, 0.0, 0.3]
+    path = follow(np.arange(30.0), poses, row)
     np.testing.assert_allclose(path.heading, headings, atol=1e-12)
     expected = [np.cos(headings) / 3.0, np.sin(headings) / 3.0, 0.1 + 0.0 * headings]
     np.testing.assert_allclose(path.centre, np.transpose(expected), atol=1e-12)
     np.testing.assert_array_equal(path.times, np.arange(30.0))
-
-
-def test_heavy_bodies_draw_the_centre_of_a_structure_which_has_no_heading():
-    structure = dataclasses.replace(make_prism().structure, mass=np.array([0.01, 0.01, 0.02]))
-    # Bodies at 0, 1/3 and 2/3 m, of which the last weighs as much as the others together.
-    path = follow(np.arange(2.0), poses(np.zeros(2)), structure)
-    np.testing.assert_allclose(path.centre[:, 0], (1 / 3 + 2 * 2 / 3) / 4)
-    assert np.isnan(path.heading).all()

@@ -1,8 +1,9 @@
-"""Structures from files at rest: against an independent simulation, and inertia by hand."""
+"""Structures from files at rest: an independent simulation's, and inertia by Drake's parts."""
 
 import numpy as np
 import pytest
 from helpers.structures import driven_as_recorded, recorded_structure, unit_inertias
+from pydrake.multibody.tree import SpatialInertia
 
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import NORMAL
@@ -41,25 +42,18 @@ def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
     scenario = load_scenario("mast").with_changes({"robot.masses": {"v2_front_low": "35 g"}})
     structure, group = Robot.of(scenario).structure, scenario.robot.struts["v2"]
     nodes = np.flatnonzero(structure.carriers == 1)
-    radius, ball_radius = group.diameter / 2, group.node_diameter / 2
-    parts = []  # of mass, place of the centre, inertia about it
+    motor, radius = structure.node_names.index("v2_front_low"), group.diameter / 2
+    total = SpatialInertia.SolidSphereWithMass(0.035, 1e-9).Shift(-structure.p_BN[motor])
     for a, b in structure.struts[np.isin(structure.struts[:, 0], nodes)]:
-        along = structure.p_BN[b] - structure.p_BN[a]
-        length = np.linalg.norm(along)
-        mass, u = group.density * np.pi * radius**2 * length, along / length
-        axial, across = mass * radius**2 / 2, mass * (radius**2 / 4 + length**2 / 12)
-        inertia = across * np.eye(3) + (axial - across) * np.outer(u, u)
-        parts.append((mass, structure.p_BN[a] + along / 2, inertia))
-    ball = group.density * 4 / 3 * np.pi * ball_radius**3
+        p_BA, p_BB = structure.p_BN[[a, b]]
+        length = np.linalg.norm(p_BB - p_BA)
+        rod = group.density, radius, length, (p_BB - p_BA) / length
+        total += SpatialInertia.SolidCylinderWithDensity(*rod).Shift(-0.5 * (p_BA + p_BB))
+    ball = SpatialInertia.SolidSphereWithDensity(group.density, group.node_diameter / 2)
     for node in nodes:
-        parts.append((ball, structure.p_BN[node], 0.4 * ball * ball_radius**2 * np.eye(3)))
-    motor = structure.node_names.index("v2_front_low")
-    parts.append((0.035, structure.p_BN[motor], np.zeros((3, 3))))
-    assert structure.mass[1] == pytest.approx(sum(mass for mass, _, _ in parts), rel=1e-12)
-    total = sum(
-        inertia + mass * ((p @ p) * np.eye(3) - np.outer(p, p)) for mass, p, inertia in parts
-    )
+        total += ball.Shift(-structure.p_BN[node])
+    assert structure.mass[1] == pytest.approx(total.get_mass(), rel=1e-12)
     found = structure.mass[1] * unit_inertias(structure)[1]
-    np.testing.assert_allclose(found, total, rtol=1e-9, atol=1e-15)
-    centre = sum(mass * p for mass, p, _ in parts)
-    np.testing.assert_allclose(centre, 0.0, atol=1e-15)  # kg m
+    expected = total.CalcRotationalInertia().CopyToFullMatrix3()
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(total.get_com(), 0.0, atol=1e-15)

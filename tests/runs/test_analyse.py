@@ -1,7 +1,6 @@
 """What analyse.py simulates of a run's best gaits."""
 
 import functools
-from concurrent.futures import ThreadPoolExecutor
 
 import analyse
 import pytest
@@ -27,7 +26,7 @@ def folder(tmp_path_factory):
     run = write_run(path, TRIALS, scenario=scenario, metrics=metrics)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(analyse, "robustness", functools.partial(analyse.robustness, draws=8))
-        analyse.analyse(run, workers=1, executor=ThreadPoolExecutor)
+        analyse.analyse(run, workers=1)
     return run
 
 

@@ -68,7 +68,7 @@ def test_the_spine_rests_where_the_authors_statics_wants_it(every, monkeypatch):
 
 
 def test_the_jumper_rises_as_on_the_page():
-    rise, clearance = measured.jump(share=0.2, damping=2.0)
+    rise, clearance = measured.jump(measured.jumper(2.0), 0.2)
     assert rise == pytest.approx(0.34, abs=0.01) and clearance > 0.06
 
 
@@ -144,8 +144,7 @@ def test_the_simplex_is_as_high_as_a_truss_on_supports_that_stay_in_place(self_s
 
 def test_lifts_of_laika_are_in_the_middle_of_their_recorded_draws():
     case = measured_intervals.cases()["blind_laika"]
-    middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
-    (found,) = case.predict([(case.scenario(), middle)])
+    found = case.predict(case.scenario(), case.unknowns)
     rows = measured_intervals.predicted("blind_laika", case).set_index("quantity")
     assert found == pytest.approx(rows["median"].to_dict(), rel=0.02)
 
@@ -154,18 +153,15 @@ def test_lifts_of_laika_are_in_the_middle_of_their_recorded_draws():
 def test_bowed_tubes_lower_the_simplex_under_a_high_load_only():
     loads = [float(load) for load in LOADS]
     case = measured_intervals.case_of("simplex_loads", loads=loads)
-    middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
-    straight, bowed = case.predict(
-        [(case.scenario(), middle | {"bow of the tubes": bow}) for bow in (0.0, 3e-3)]
-    )
+    bows = ({"bow of the tubes": bow} for bow in (0.0, 3e-3))
+    straight, bowed = (case.predict(case.scenario(), case.unknowns | bow) for bow in bows)
     lower = {load: straight[f"H at {load} kN"] - bowed[f"H at {load} kN"] for load in LOADS}
     assert lower["0.60"] < 0.5 and lower["2.08"] > 2.0
 
 
 def test_a_longer_tube_stresses_all_members_of_the_simplex_by_the_published_mode():
     case = measured_intervals.case_of("anew_simplex_tightened", lengthenings=[2, 8])
-    middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
-    (force,) = case.predict([(case.scenario(), middle)])
+    force = case.predict(case.scenario(), case.unknowns)
     added = {member: force[f"{member} at +8 mm"] - force[f"{member} at +2 mm"] for member in MODE}
     for member, share in MODE.items():
         assert added[member] / added["S1"] == pytest.approx(share, rel=0.02)

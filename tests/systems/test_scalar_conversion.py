@@ -132,10 +132,6 @@ def test_a_robot_converts_with_its_ground_in_the_modes_of_the_state(changes):
 def test_a_clone_moves_as_its_original_and_apart_from_it(changes):
     diagram, simulator = walking(changes)
     clone = diagram.Clone()
-    kinds, same = ([type(each) for each in one.GetSystems()] for one in (clone, diagram))
-    assert [each.__name__ for each in kinds] == [
-        "Diagram" if each.__name__ == "StartUpGate" else each.__name__ for each in same
-    ]
     other = Simulator(clone)  # a clone of Drake's plant loses default poses of free bodies
     start = diagram.CreateDefaultContext()
     other.get_mutable_context().SetTimeStateAndParametersFrom(start)

@@ -45,8 +45,8 @@ from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import GivenScenario, given_scenario
-from tetra_drake.systems import GroundContact, HeldSignals, SampledController
-from tetra_drake.systems.diagram import MakeTensegrityDiagram, SetStart
+from tetra_drake.systems import GroundContact, SampledController
+from tetra_drake.systems.diagram import MakeSignalSource, MakeTensegrityDiagram, SetStart
 
 _WITNESS_WINDOW = 2e-5  # s; precision of witnessed mode changes for accuracies of 1e-3 and above
 _WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; Drake's isolation window is this times the accuracy
@@ -118,14 +118,14 @@ def _signals(pilot: Pilot, first: np.ndarray, time: float, readings: Readings) -
 class _DiagramRobot:
     """Simulation of one robot from start to end, in a Drake diagram of its own.
 
-    If the robot has no gait, the diagram has a system `controller`: a SampledController for a
-    policy or a controller, or a HeldSignals for a command. After an event, the simulation goes on
-    with the diagram of the changed robot, from the same state.
+    If no oscillators drive the robot, the diagram has a system `controller`: a SampledController
+    for a policy or a controller, or a source of the signals of a command. After an event, the
+    simulation goes on with the diagram of the changed robot, from the same state.
     """
 
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
         self._driven, self._record, self._viewer = driven, record, viewer
-        self._marks, self._changes = driven.marks.tolist(), driven.changes
+        self._marks = driven.marks.tolist()
         self._observer, self._speed_limit = Observer(driven), speed_limit(driven)
         self._build(driven.robot)
         self._monitor()
@@ -136,14 +136,14 @@ class _DiagramRobot:
         if robot.scenario.events:  # _become() plays them
             until = robot.scenario.with_sections(events=[])
             robot = dataclasses.replace(robot, scenario=until)
-        if (gait := driven.oscillating) is not None:
-            diagram = MakeTensegrityDiagram(robot, gait, steering=driven.steering)
-        elif driven.pilot is not None:
+        gait, source = driven.oscillating, None
+        if driven.pilot is not None:
             law = functools.partial(_signals, driven.pilot, driven.robot.first_signals)
-            system = SampledController(robot, law, period=driven.pilot.period)
-            diagram = MakeTensegrityDiagram(robot, controller=system)
-        else:
-            diagram = MakeTensegrityDiagram(robot, controller=HeldSignals(robot))
+            source = SampledController(robot, law, period=driven.pilot.period)
+        elif driven.samples.size:
+            source = MakeSignalSource(driven.samples, step=robot.scenario.cpg.listing_step)
+        steering = driven.steering
+        diagram = MakeTensegrityDiagram(robot, gait, steering=steering, controller=source)
         self._diagram, self._steps = diagram, _Steps.of(robot, settings)
         self._simulator = _make_simulator(diagram, robot, self._steps)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
@@ -198,10 +198,6 @@ class _DiagramRobot:
                 # Errors of Drake: the step became too small, or the state is not finite.
                 now, reason = self._simulator.get_context().get_time(), str(error).strip()
                 raise Diverged(time=now, reason=reason.splitlines()[0]) from error
-            if stop in self._changes:
-                context = self._simulator.get_mutable_context()
-                holder = self._diagram.GetSubsystemByName("controller")
-                holder.Hold(holder.GetMyMutableContextFromRoot(context), self._changes[stop])
 
     def _become(self, phase: Phase, before: Phase) -> None:
         """Goes on with the robot of another phase in place of this one; see Phase.entered()."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -17,6 +18,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.laws.actuator import has_drive
 from tetra_drake.laws.cable import tendon_coefficients, tendon_faults
 from tetra_drake.laws.contact import NormalForce
+from tetra_drake.laws.dry_friction import SPIN_CREEP
 from tetra_drake.laws.inertia import XX
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import (
@@ -48,6 +50,8 @@ LEAST_MOMENT = 1e-14
 _LEAST_FRICTION = 1e-5
 """Least coefficient of friction in MuJoCo. MJX has no contacts without friction (condim 1) beside
 elliptic cones."""
+_ALONG, _ABOUT = np.split(np.eye(6), 2)
+"""Gears of actuators (3, 6) along axes, and about axes."""
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
 _SOFT = {"condim": "3", "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1]}
 """Settings of all contacts."""
@@ -149,8 +153,8 @@ def loose_remark(robot: Robot) -> str:
     """Remark on differences between MuJoCo's tendons and the robot's cables, with names of such
     cables; "" if there are none. See tendon_faults() of laws.cable."""
     structure = robot.structure
-    rubs = ", ".join(structure.rubbing)
-    remarks = [f"friction at rings and in joints, left out: {rubs}"] if rubs else []
+    rubs = ", ".join(key for key in structure.rubbing if key not in structure.joint_keys)
+    remarks = [f"friction at rings, left out: {rubs}"] if rubs else []
     if not robot.scenario.actuation.keeps_spring:
         return "".join(remarks)
     for fault, cables in tendon_faults(structure.cables, slack=structure.slack).items():
@@ -313,7 +317,8 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
 
 def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
     """Adds MuJoCo actuators: one for each axis of an anchor, which holds a node by a damped spring,
-    and one for each component of a load, a constant force on a node."""
+    one for each component of a load, a constant force on a node, and three dampers with the torque
+    limit of each joint with friction, about the axes of its first body."""
     actuators, anchors, loads = add_element(model, "actuator"), structure.anchors, structure.loads
     laws = np.stack([0.0 * anchors.stiffness, -anchors.stiffness, -anchors.damping], axis=2)
     for node, place, of_axes in zip(anchors.nodes, anchors.places, laws, strict=True):
@@ -324,6 +329,11 @@ def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
         name, of_axes = structure.node_names[node], np.outer(force, [1.0, 0.0, 0.0])
         add_element(world, "site", name=f"load {name}", pos=np.zeros(3))
         _add_push(actuators, f"load {name}", of_axes, site=name, refsite=f"load {name}")
+    for (first, second), limit in zip(structure.joints, structure.joint_friction, strict=True):
+        of_axes = np.tile([0.0, 0.0, -limit / SPIN_CREEP], (3, 1))
+        ends = {"site": structure.node_names[second], "refsite": structure.node_names[first]}
+        name = f"friction {ends['refsite']} {ends['site']}"
+        _add_push(actuators, name, of_axes, axes=_ABOUT, **ends, forcerange=[-limit, limit])
 
 
 def _add_joints(model: Element, structure: Structure, *, step: float) -> None:
@@ -341,27 +351,23 @@ def _add_joints(model: Element, structure: Structure, *, step: float) -> None:
         k = 1.0 / (step * (step + 2.0 * time_constant))
         per_mass = 1.0 / structure.mass[body_a] + 1.0 / structure.mass[body_b]
         impedance = stiffness * per_mass / (k + stiffness * per_mass)
-        names = structure.node_names
-        add_element(
-            constraints,
-            "connect",
-            site1=names[first],
-            site2=names[second],
-            solref=[-k * impedance, -k * time_constant * impedance],
-            solimp=[impedance, impedance, 1, 0.5, 1],
-        )
+        ends = {"site1": structure.node_names[first], "site2": structure.node_names[second]}
+        solref = [-k * impedance, -k * time_constant * impedance]
+        solimp = [impedance, impedance, 1, 0.5, 1]
+        add_element(constraints, "connect", **ends, solref=solref, solimp=solimp)
 
 
-def _add_push(actuators: Element, name: str, laws: np.ndarray, *, site: str, refsite: str) -> None:
-    """Adds MuJoCo actuators that push a site along the axes of another site, `refsite`, and this
-    the other way; one for each axis whose law is not zero.
+def _add_push(
+    actuators: Element, name: str, laws: np.ndarray, axes: np.ndarray = _ALONG, **settings: Any
+) -> None:
+    """Adds MuJoCo actuators that push a site along the axes of another site, and this the other
+    way; one for each axis whose law is not zero.
 
-    `laws` (3, 3) has a row per axis: a constant force (N), the force per displacement from
-    `refsite` in N/m, and the force per velocity in N s/m. A spring and a damper have negative
-    numbers.
+    `laws` (3, 3) has a row per axis: a constant force (N), the force per displacement in N/m, and
+    the force per velocity in N s/m. A spring and a damper have negative numbers. With `_ABOUT` as
+    `axes`, they are torques. `settings` are the sites `site` and `refsite`, and others in MJCF.
     """
-    ends = {"site": site, "refsite": refsite}
-    for axis, gear, law in zip("xyz", np.eye(3, 6), laws, strict=True):
+    for axis, gear, law in zip("xyz", axes, laws, strict=True):
         if law.any():
             force = {"gear": gear, "gainprm": "0", "biastype": "affine", "biasprm": law}
-            add_element(actuators, "general", name=f"{name} {axis}", **ends, **force)
+            add_element(actuators, "general", name=f"{name} {axis}", **force, **settings)

@@ -162,11 +162,11 @@ class _MujocoRobot:
         self._due = np.rint(self._times / self._step).astype(int)  # numbers of the sampled steps
         count = len(self._times)
         self._states_kept = np.tile(self._state, (count, 1))
-        self._signals_kept = np.tile(robot.first_signals, (count, 1))
         self._drives_kept = np.tile(self._drives, (count, 1))
 
-        self._done, self._began = 0, 0.0
-        self._before = self._held = robot.first_signals
+        self._done, self._bends = 0, [(0.0, robot.first_signals)]
+        """Number of simulated steps; times (s) and signals (m,) in N of a policy or controller,
+        which are linear in between and held at the end."""
 
     def _make_model(self) -> None:
         """Makes MuJoCo's model of the present robot, at its start."""
@@ -187,16 +187,16 @@ class _MujocoRobot:
 
     def simulated(self) -> SimulationResult:
         """The result at the end of the simulation. Raises Diverged."""
-        pilot, phases = self._driven.pilot, self._driven.robot.phases
-        changes = [*itertools.pairwise(phases)]
+        pilot, scenario = self._driven.pilot, self._driven.robot.scenario
+        changes = [*itertools.pairwise(self._driven.robot.phases)]
         action = pilot.acts_after(0.0) if pilot else math.inf
-        end, started = self._driven.robot.scenario.simulation.duration, perf_counter()
+        end, started = scenario.simulation.duration, perf_counter()
         try:
             while (now := min(action, changes[0][1].begins if changes else end)) < end:
                 self._advance_to(now)
                 if pilot and action <= now + SAME_TIME:
-                    signals = signals_of_one(pilot, self._readings())
-                    self._before, self._held, self._began = self._held, signals, now
+                    held, signals = self._bends[-1][1], signals_of_one(pilot, self._readings())
+                    self._bends += [(now, held), (now + scenario.cpg.listing_step, signals)]
                     action = pilot.acts_after(action)
                 while changes and changes[0][1].begins <= now + SAME_TIME:
                     self._become(*changes.pop(0))
@@ -249,7 +249,6 @@ class _MujocoRobot:
         last = min(self._steps, math.ceil(time / self._step - rounding))
         signals = self._signals_at(self._step * np.arange(self._done, last + 1))
         if self._done == 0 and len(signals) > 1:
-            self._signals_kept[0] = signals[0]
             start = self._body_states(self._state[np.newaxis])
             self._observer.add(np.zeros(1), start, signals[:1], self._drives[np.newaxis])
         with Rollout(nthread=0) as rollout:
@@ -260,8 +259,7 @@ class _MujocoRobot:
                 self._state, self._drives, done = states[-1], drives[-1], self._done
                 here = (done < self._due) & (self._due <= done + len(states))
                 rows = self._due[here] - done - 1
-                self._states_kept[here], self._signals_kept[here] = states[rows], after[rows]
-                self._drives_kept[here] = drives[rows]
+                self._states_kept[here], self._drives_kept[here] = states[rows], drives[rows]
                 times = self._step * np.arange(done + 1, done + len(states) + 1)
                 self._observer.add(times, self._body_states(states), after, drives)
                 v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
@@ -277,13 +275,12 @@ class _MujocoRobot:
                 self._done += len(states)
 
     def _signals_at(self, times: Array) -> Array:
-        """Signals (times, m) in N at simulated times (s) (times,). No time may be before the latest
-        action of a policy or controller."""
+        """Signals (times, m) in N at simulated times (s) (times,)."""
         if not self._driven.pilot:
             return self._driven.signals_at(times)
-        change = self._driven.robot.scenario.cpg.listing_step
-        left = 1.0 - np.clip((times - self._began) / change, 0.0, 1.0)[:, np.newaxis]
-        return self._held - left * (self._held - self._before)
+        bends, signals = zip(*self._bends, strict=True)
+        rows = [np.interp(times, bends, each) for each in np.transpose(signals)]
+        return np.reshape(rows, (len(signals[0]), len(times))).T
 
     def _stepped(self, rollout: Any, signals: Array) -> tuple[Array, Array]:
         """Simulates one step for each row of signals (steps, m) in N, from the present state.
@@ -327,14 +324,13 @@ class _MujocoRobot:
         """States [q; v] (rows, 13*bodies), as Drake orders them, from MuJoCo's states (rows,
         numbers). MuJoCo's angular velocities are in the body's frame, the returned ones in the
         world's."""
-        rows, end = len(states), 1 + self._model.nq
-        if not rows:
-            return np.empty((0, self._model.nq + self._model.nv))
-        pose = states[:, 1:end].reshape(rows, -1, 7)
-        velocity = states[:, end:].reshape(rows, -1, 6)
+        rows, bodies, end = len(states), self._model.nv // 6, 1 + self._model.nq
+        pose = states[:, 1:end].reshape(rows, bodies, 7)
+        velocity = states[:, end:].reshape(rows, bodies, 6)
         w_WB = rotated(pose[..., 3:], velocity[..., 3:])
-        parts = (pose[..., 3:], pose[..., :3]), (w_WB, velocity[..., :3])
-        return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
+        q = np.concatenate([pose[..., 3:], pose[..., :3]], axis=2).reshape(rows, 7 * bodies)
+        v = np.concatenate([w_WB, velocity[..., :3]], axis=2).reshape(rows, 6 * bodies)
+        return np.hstack([q, v])
 
     def _motion(self, times: Array, states: Array, signals: Array, drives: Array) -> Motion:
         """Motion from MuJoCo's states (rows, numbers) at `times` (rows,) in s, with MuJoCo's
@@ -380,9 +376,7 @@ class _MujocoRobot:
 
     def _kept(self, rows: slice) -> Motion:
         """The motion of the present robot at some of the times of the samples."""
-        times, signals = self._times[rows], self._signals_kept[rows]
-        if not self._driven.pilot:  # known at the times themselves
-            signals = self._driven.signals_at(times)
+        times, signals = self._times[rows], self._signals_at(self._times[rows])
         return self._motion(times, self._states_kept[rows], signals, self._drives_kept[rows])
 
 

@@ -347,10 +347,9 @@ def _predict(
     from tetra_drake.lab.study.equilibrium import robot_of_file
     from tetra_drake.robot.command_file import load_command
     from tetra_drake.scenario.load import load_scenario
-    from tetra_drake.scenario.scenario import scenario_of
 
     is_scenario = format_of(source) == "scenario"
-    scenario = load_scenario(source) if is_scenario else scenario_of(robot_of_file(source).scenario)
+    scenario = load_scenario(source) if is_scenario else robot_of_file(source).scenario
     played = None if command is None else load_command(command, scenario)
     if quantities is None:
         groups = dict.fromkeys(scenario.robot.blueprint().cable_groups)

@@ -61,7 +61,7 @@ class Ranges:
         in_body = np.zeros(len(self.free), dtype=bool)
         in_body[space.body] = True
         self._in_body = in_body[self.free]
-        self._box = Box(len(space.free_body))
+        self._box = Box(int(in_body.sum()))
 
     def random(self, count: int, generator: np.random.Generator) -> Matrix:
         """Points (count, size) of random gaits, one per row: their free parameters, scaled to 0 to

@@ -37,7 +37,7 @@ from tetra_drake.scenario.metrics import (
     has_rolled,
     headline_metric,
 )
-from tetra_drake.scenario.scenario import Scenario, scenario_of
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.world import SimulationSection
 from tetra_drake.settings.section import Section
 
@@ -206,7 +206,7 @@ def make_result(
         wall_time: wall time of the integration in s.
         record: whether the result has a trajectory.
     """
-    robot, scenario = driven.robot, scenario_of(driven.robot.scenario)
+    robot, scenario = driven.robot, driven.robot.scenario
     simulation, structure = robot.scenario.simulation, robot.structure
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)

@@ -73,9 +73,6 @@ LENGTH_DIGITS = 9
 """Decimals of a cable length (m) in equilibrium. Further digits depend on the processor, and a
 simulation with feedback would amplify their differences."""
 
-_WIDER = 100.0
-"""Pivots of a Cholesky factorisation up to so many times an eigenvalue may belong to it."""
-
 _LOG = logging.getLogger(LOGGER)
 
 
@@ -364,9 +361,8 @@ def free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     last call of force_at_rest()."""
     stiffness = stiffness_at_rest(robot).toarray()
     farthest = np.abs(robot.forces.nodes[:, P_WN : P_WN + 3]).max()
-    share = max(
-        LEAST_STIFFNESS, ROUNDING * farthest / (robot.model.bodies.radius.max() or farthest)
-    )
+    rounding = ROUNDING * farthest / (robot.model.bodies.radius.max() or farthest)
+    share = max(LEAST_STIFFNESS, rounding)
     soft = soft_space(stiffness, share * stiffness.diagonal().max())
     return linalg.orth(np.hstack([_rigid_motions(robot, state).T, soft]), rcond=0.1)
 
@@ -408,20 +404,9 @@ def product(a: np.ndarray, b: np.ndarray) -> float:
 
 def soft_space(matrix: np.ndarray, least: float) -> np.ndarray:
     """Orthonormal basis (n, vectors), in columns, of a symmetric matrix (n, n): of the eigenvectors
-    whose eigenvalues are at most `least` in size.
-
-    A Cholesky factorisation with pivoting finds a space that contains them nearly. It takes a
-    thirtieth of the time of an eigenvalue decomposition.
-    """
-    size = len(matrix)
-    factor, pivots, rank, _ = linalg.lapack.dpstrf(matrix, tol=_WIDER * least)
-    stiff, soft = pivots[:rank] - 1, pivots[rank:] - 1
-    space = np.zeros((size, size - rank))
-    space[stiff] = -linalg.solve_triangular(factor[:rank, :rank], factor[:rank, rank:])
-    space[soft] = np.eye(size - rank)
-    space = linalg.qr(space, mode="economic")[0]
-    eigenvalues, vectors = linalg.eigh(space.T @ matrix @ space)
-    return np.asarray(space @ vectors[:, np.abs(eigenvalues) <= least])
+    whose eigenvalues are at most `least` in size."""
+    eigenvalues, vectors = linalg.eigh(matrix)
+    return np.asarray(vectors[:, np.abs(eigenvalues) <= least])
 
 
 def orthonormal(vectors: np.ndarray, least: float) -> np.ndarray:

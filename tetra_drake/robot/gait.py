@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.scenario.world import World
 
@@ -112,9 +112,7 @@ def constant_steering(turn: float) -> SteeringSignal:
     """Steering function that gives the same turn, -1 to 1, at all times; a positive turn raises the
     input of left oscillators. Raises InputError unless the turn is a number; checked_turn() checks
     its limits later."""
-    if isinstance(turn, bool) or not isinstance(turn, numbers.Real):
-        expected = "a number from -1 to 1, or a function of the time in s"
-        raise InputError("steering", "", f"found {turn!r}, expected {expected}")
+    check_type("steering", "", turn, numbers.Real, Callable)
     return lambda time: turn
 
 

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.errors import InputError, check_type, check_whole
+from tetra_drake.errors import InputError, check_type, check_whole, checked_numbers
 from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.robot.gait import Body, Gait, check_parameters
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -54,10 +54,8 @@ class ParameterSpace:
     """Bounds of the numbers of the body, also of fixed ones; see Scenario.evolve."""
     turn: float
     """Steering of all gaits; see Gait.turn."""
-    free_body: tuple[str, ...]
-    """Keys of the numbers of the body that are parameters: their bounds differ."""
     body: slice
-    """Places of the body's numbers in a vector."""
+    """Places in a vector of the body's numbers that are parameters: their bounds differ."""
     names: tuple[str, ...]
     """Names such as "weight 3->1 extensor", "gain length", "robot.density", "tau_A"."""
     low: Vector
@@ -87,7 +85,6 @@ class ParameterSpace:
             parameters=scenario.parameters,
             evolve=scenario.evolve,
             turn=scenario.gait_bounds.turn,
-            free_body=tuple(free),
             body=slice(len(alone), len(alone) + len(free)),
             names=names,
             low=low,
@@ -129,7 +126,7 @@ class ParameterSpace:
     def _body_numbers(self, gait: Gait) -> dict[str, float]:
         """Numbers in SI of the body of a gait that are parameters, by key."""
         given, body = dict(gait.body), {}
-        for key in self.free_body:
+        for key in self.names[self.body]:
             if key not in given:
                 raise InputError("ParameterSpace", f"gait {gait.name}", f"lacks the body's {key}")
             unit, value = getattr(self.evolve[key][0], "unit", ""), given[key]
@@ -163,14 +160,7 @@ class ParameterSpace:
 
     def _numbers(self, vector: npt.ArrayLike) -> Vector:
         """A copy of a vector. Raises InputError unless it has a number for each parameter."""
-        try:
-            given = np.array(vector)
-        except ValueError:  # rows of different lengths
-            given = np.array(None)
-        if given.shape != (len(self.names),) or given.dtype.kind not in "iuf":
-            problem = f"found {vector!r:.60}, expected {len(self.names)} numbers"
-            raise InputError("ParameterSpace", "vector", problem)
-        return given.astype(np.float64)
+        return checked_numbers(vector, (len(self.names),), source="ParameterSpace", key="vector")
 
 
 WALKING_SEED = 80

@@ -18,7 +18,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.blueprint import SAGS
 from tetra_drake.scenario.metrics import looks_for_distance
-from tetra_drake.scenario.scenario import scenario_of
 
 LEAST_MOTION = 0.01
 """Least change of a cable's length that signals should cause, as a share of the length."""
@@ -60,7 +59,7 @@ def stillness_remark(robot: Robot, metrics: Mapping[str, float]) -> str:
     a tenth of its own length, with the likely reason. `metrics` are by name, in SI units. It is ""
     otherwise."""
     scenario, units = robot.scenario, robot.scenario.units
-    distance, objective = metrics["distance"], scenario_of(scenario).objective
+    distance, objective = metrics["distance"], scenario.objective
     is_to_move = looks_for_distance(objective) or objective.get("rolled", 0.0) > 0.0
     if not is_to_move or not abs(distance) < STILL * robot.structure.length:
         return ""

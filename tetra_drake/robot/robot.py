@@ -34,6 +34,7 @@ from tetra_drake.scenario.world import World
 
 if TYPE_CHECKING:
     from tetra_drake.robot.equilibrium import Equilibrium
+    from tetra_drake.scenario.scenario import Scenario
 
 LIGHT, LEAST = 0.05, 1e-4
 """Damping ratios: below the first one damping is light; steps preserve the second one at least."""
@@ -44,7 +45,7 @@ class Robot:
     """A robot of a scenario on its ground at t = 0: what an engine needs for a simulation, except
     a gait or other signals."""
 
-    scenario: World
+    scenario: Scenario
     structure: Structure
     model: Model
     """Constants of bodies, cables and ground, as arguments of the compiled kernels."""
@@ -56,7 +57,7 @@ class Robot:
     """The robot at t = 0, if this one is what events have left of it; otherwise None."""
 
     @classmethod
-    def of(cls, scenario: World, *, at_rest: bool = False) -> Self:
+    def of(cls, scenario: Scenario, *, at_rest: bool = False) -> Self:
         """The robot of a scenario at its start: in equilibrium if its settings say so, then turned
         by its `start` and moved by the offsets of its bodies, on the scenario's terrain.
 

@@ -147,26 +147,14 @@ class DrivenRobot:
         gait = self.oscillating
         return self.samples if gait is None else signal_samples(self.robot, gait, self.steering)
 
-    @property
-    def changes(self) -> dict[float, np.ndarray]:
-        """Changes of the given signals. A key is the time (s) at which a change begins, its value
-        the signals (m,) in N after the change. Empty for a gait."""
-        begins = self.robot.scenario.cpg.listing_step * self._changing
-        after = self.samples[self._changing + 1]
-        return dict(zip(begins.round(MARK_DECIMALS).tolist(), after, strict=True))
-
-    @functools.cached_property
-    def _changing(self) -> np.ndarray:
-        """Indices of the given samples after which the signals change: the next sample differs."""
-        return np.flatnonzero((np.diff(self.samples, axis=0) != 0.0).any(axis=1))
-
     @functools.cached_property
     def marks(self) -> np.ndarray:
         """Times (s) at which a step of the integrator must end, ascending: the start t = 0, the
         start-up time, `simulation.steady_from`, the end, and where a change of the given signals
         begins or ends."""
         settings, step = self.robot.scenario.simulation, self.robot.scenario.cpg.listing_step
-        ends = step * np.add.outer([0, 1], self._changing).ravel()
+        changing = np.flatnonzero((np.diff(self.samples, axis=0) != 0.0).any(axis=1))
+        ends = step * np.add.outer([0, 1], changing).ravel()
         instants = np.append([0.0, settings.settling_time, self.start_up], ends)
         marks = np.unique(instants.round(MARK_DECIMALS))
         before = marks[marks < settings.duration - 0.5 * 10.0**-MARK_DECIMALS]

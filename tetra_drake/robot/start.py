@@ -25,11 +25,8 @@ def started(scenario: World, structure: Structure, start: Start) -> Structure:
 
     own = [start.bodies.get(name, BodyStart()) for name in structure.bodies]
     whole, turns = start.rotation, [one.rotation for one in own]
-    turned = (
-        Rotation.concatenate(turns)
-        * whole
-        * Rotation.from_quat(np.roll(structure.q_WB, -1, axis=1))
-    )
+    before = Rotation.from_quat(np.roll(structure.q_WB, -1, axis=1))
+    turned = Rotation.concatenate(turns) * whole * before
     centre = structure.mass @ structure.p_WB / structure.mass.sum()
     arms = whole.apply(structure.p_WB - centre)
     w_WB = np.add(start.spin, [one.spin for one in own])

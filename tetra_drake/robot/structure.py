@@ -125,8 +125,8 @@ class Structure(Blueprint):
     def least_radius(self) -> float:
         """Radius (m) of the thinnest strut. Without struts it is a hundredth of the robot's largest
         extent along an axis. Shapes that are drawn have at least this radius."""
-        size = float(np.ptp(self.p_WN, axis=0).max())
-        return float(self.strut_radius.min()) if self.strut_radius.size else size / SLENDERNESS
+        radii = self.strut_radius
+        return float(radii.min()) if radii.size else self.length / SLENDERNESS
 
     @property
     def radius(self) -> np.ndarray:

@@ -425,9 +425,7 @@ class Blueprint:
             joined[joined == joined[first]] = joined[second]
         apart = np.flatnonzero(joined[:WORLD] != joined[0])
         if apart.size:
-            problem = (
-                f"no cables lead from the body '{self.bodies[apart[0]]}' to '{self.bodies[0]}'"
-            )
+            problem = f"no cables lead from '{self.bodies[apart[0]]}' to '{self.bodies[0]}'"
             refuse("cables", f"{problem}, expected all bodies to be joined")
 
         lengths = self.along_cables(self._distances(self.segments.ends))

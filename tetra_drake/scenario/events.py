@@ -103,9 +103,7 @@ def _point_masses(blueprint: Blueprint) -> list[str]:
     """Names of the nodes and bodies with a point mass. A body whose mass is given in place of its
     parts has none that could be lost."""
     of_nodes = zip(blueprint.node_names, blueprint.node_mass, blueprint.carriers, strict=True)
-    given, of_bodies = (
-        blueprint.given_inertia,
-        zip(blueprint.bodies, blueprint.payload, strict=True),
-    )
+    of_bodies = zip(blueprint.bodies, blueprint.payload, strict=True)
+    given = blueprint.given_inertia
     names = [name for name, mass, body in of_nodes if mass > 0.0 and body not in given]
     return names + [name for name, mass in of_bodies if mass > 0.0]

@@ -13,7 +13,7 @@ from tetra_drake.scenario.shipped import SCENARIOS, shipped_scenarios
 from tetra_drake.scenario.structure_files import structure_file, with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 from tetra_drake.settings.refusals import no_such
-from tetra_drake.settings.section import keys_of, written
+from tetra_drake.settings.section import written
 
 SCENARIO = "scenario.yaml"
 """Name of the scenario's file in a folder that a command writes."""
@@ -91,7 +91,7 @@ def _file(name: str, folder: Path) -> Path:
 def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
     """Loads the scenario of a file, with the values that it takes from its base, and so on. `seen`
     are the files that are based on this one. Raises InputError if it is based on one of them."""
-    keys = [*keys_of(Scenario), "base"]
+    keys = [*Scenario.model_fields, "base"]
     given = read_mapping(file, "scenario file", keys=[*keys, "nodes"])
     if "nodes" in given:
         expected = "`base: prism` and `robot: !Structure {file: ...}`, which names this file"

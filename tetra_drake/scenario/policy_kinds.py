@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib
 import math
 import os
 import sys
@@ -14,6 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from tetra_drake.errors import InputError, checked_numbers
+from tetra_drake.on_demand import loaded
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.policies import DrivenRobots, PolicyBounds, PolicyKind, driven_names
 from tetra_drake.settings.quantities import PAIR, Time
@@ -183,11 +183,10 @@ class PythonPolicy(PolicyKind):
 def imported_function(path: str) -> Callable[..., Any]:
     """The function of a module, given as "module:function". Modules are also searched in the
     working folder. Raises InputError if it cannot be imported or is no function."""
-    module, _, name = path.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:
-        function = getattr(importlib.import_module(module), name)
+        function = loaded(path)
     except Exception as error:
         problem = f"cannot be imported: {type(error).__name__}: {error}"
         raise InputError("policy.function", path, problem) from error

@@ -540,23 +540,12 @@ class StructureFile(RobotSettings):
     def _prepare(cls, tree: Any) -> Any:
         """Checks the content of a structure file before its fields are read, and completes it.
 
-        Raises InputError if a group of struts or cables has no key `pairs`. Then most often a
-        scenario meant to change a group of the file, but misspelled its name. Replaces `pinned` by
-        joints. Nodes get the unit of the key `unit` where their coordinates are bare numbers.
-        Afterwards `unit` is "mm" or None: a robot in mm is shown in mm, for others Scenario.units
-        chooses the unit by size.
+        Replaces `pinned` by joints. Nodes get the unit of the key `unit` where their coordinates
+        are bare numbers. Afterwards `unit` is "mm" or None: a robot in mm is shown in mm, for
+        others Scenario.units chooses the unit by size.
         """
         if not isinstance(tree, dict):
             return tree
-        for kind in ("struts", "cables"):
-            given = tree.get(kind)
-            groups = given.items() if isinstance(given, dict) else ()
-            mappings = [(str(n), x or {}) for n, x in groups if isinstance(x, dict | None)]
-            whole = [name for name, group in mappings if "pairs" in group]
-            for name, group in mappings:
-                if "pairs" not in group:
-                    refuse(f"{kind}.{name}", f"found a group without pairs; {hint(name, whole)}")
-
         tree = with_joints(tree) if tree.get("pinned") else tree
         unit = tree.get("unit")
         if unit is None:

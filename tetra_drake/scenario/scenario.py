@@ -257,13 +257,6 @@ class Scenario(World):
         return self
 
 
-def scenario_of(world: World) -> Scenario:
-    """The scenario whose world this is. Raises TypeError for a world without experiment."""
-    if not isinstance(world, Scenario):
-        raise TypeError(f"expected a Scenario, found a {type(world).__name__}")
-    return world
-
-
 @functools.cache
 def _thesis() -> Scenario:
     """The scenario `thesis`, which printed scenarios are compared with."""

@@ -14,7 +14,7 @@ from tetra_drake.scenario.shipped import named_structure, structure_names
 from tetra_drake.scenario.structure_graph import members
 from tetra_drake.scenario.yaml_text import read_mapping
 from tetra_drake.settings.refusals import TAG, described, no_such
-from tetra_drake.settings.section import Tree, keys_of
+from tetra_drake.settings.section import Tree
 
 _LOG = logging.getLogger("tetra_drake")
 _KIND = StructureFile.tag
@@ -84,7 +84,7 @@ def _content(file: Path) -> Tree:
     """Content of a structure file. Raises InputError for a file of other software."""
     if file.suffix.lower() in XML_SUFFIXES:
         raise _foreign(file, "MuJoCo")
-    keys = [*keys_of(StructureFile), *KEYS_OF_NTRT]
+    keys = [*StructureFile.model_fields, *KEYS_OF_NTRT]
     content = read_mapping(file, "structure file", keys=keys)
     if not KEYS_OF_NTRT.isdisjoint(content):
         raise _foreign(file, "NTRT", unit=" --unit dm")

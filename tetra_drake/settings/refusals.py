@@ -52,12 +52,14 @@ def input_error(
     is_unknown, name = first["type"] in _UNKNOWN, str(first["loc"][-1]) if first["loc"] else ""
     schema = _schema_of(section)
     members = kinds = [schema]
+    siblings, own = Tree(), ""
     # The place also contains tags and names of union members, which are no keys.
     for part in first["loc"][:-1] if is_unknown else first["loc"]:
         if isinstance(tree, list) and isinstance(part, int):
             key, tree = joined(key, f"[{part}]"), tree[part]
         elif isinstance(tree, dict) and part in tree:
-            key, tree = joined(key, str(part)), tree[part]
+            siblings, own = tree, str(part)
+            key, tree = joined(key, own), tree[part]
         inner = _inner(part, members, schema)
         if inner is not members:
             members, kinds = inner, members if len(members) > 1 else inner
@@ -75,6 +77,10 @@ def input_error(
     if first["type"] == "missing" and "base" in schema["properties"]:
         whole = f", as !{tree[TAG]} replaces a base's kind" if TAG in (tree or {}) else ""
         problem += whole or ", or name a `base` that has it"
+        # Perhaps a name of a map is misspelt.
+        given = {name: x for name, x in siblings.items() if isinstance(x, dict) and inner_key in x}
+        if close := difflib.get_close_matches(own, given, n=1):
+            problem += f"; did you mean '{close[0]}'?"
     return InputError(source, joined(key, inner_key), problem)
 
 

@@ -21,7 +21,6 @@ from typing import Annotated, Any, ClassVar, Self, Union
 
 import pydantic
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema
 
 from tetra_drake import on_demand
@@ -253,11 +252,6 @@ def _hashable(value: Any) -> Any:
     if isinstance(value, dict):
         value = list(value.items())
     return tuple(map(_hashable, value)) if isinstance(value, (list, tuple)) else value
-
-
-def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
-    """pydantic's fields of a section, by their keys in files."""
-    return {field.alias or name: field for name, field in section.model_fields.items()}
 
 
 @dataclass(frozen=True)

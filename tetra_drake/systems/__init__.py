@@ -2,9 +2,9 @@
 
 All names here are public. In the order of the signal flow: Steering, MatsuokaCpg (OscillatorCpg for
 other kinds of oscillators), StartUpGate, CableNetwork, GroundContact and StateForces around a
-MultibodyPlant, and Feedback back to the network; HeldSignals or SampledController in place of a
-network. AddCables, AddGroundContact and Attach add them to any plant;
-diagram.MakeTensegrityDiagram() wires a robot.
+MultibodyPlant, and Feedback back to the network; a SampledController in place of a network.
+AddCables, AddGroundContact and Attach add them to any plant; diagram.MakeTensegrityDiagram() wires
+a robot.
 
 Diagrams of these systems convert to AutoDiffXd and can be cloned; see `scalar_conversion`.
 

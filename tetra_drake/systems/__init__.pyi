@@ -9,7 +9,6 @@ from tetra_drake.systems.cable_network import CableNetwork as CableNetwork
 from tetra_drake.systems.ground_contact import GroundContact as GroundContact
 from tetra_drake.systems.state_forces import StateForces as StateForces
 from tetra_drake.systems.feedback import Feedback as Feedback
-from tetra_drake.systems.sampled_controller import HeldSignals as HeldSignals
 from tetra_drake.systems.sampled_controller import SampledController as SampledController
 from tetra_drake.systems.cable_network import Cable as Cable
 from tetra_drake.systems.cable_network import AddCables as AddCables

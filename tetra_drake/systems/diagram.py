@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import NoneType
 
 import numpy as np
@@ -41,6 +41,10 @@ from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
 from tetra_drake.systems.oscillator_cpg import OscillatorCpg
 from tetra_drake.systems.start_up_gate import StartUpGate
 from tetra_drake.systems.steering import Steering
+
+_OUTPUTS = ["drives", "state", "signals", "tensions", "lengths"]
+_OUTPUTS += ["normal_forces", "friction_forces", "contact_forces", "modes"]
+"""Output ports of a robot's diagram, as far as its systems have them."""
 
 
 def MakeTensegrityDiagram(
@@ -182,27 +186,27 @@ def MakeTensegrityDiagram(
 
         Attach(builder, plant, builder.AddNamedSystem("state_forces", StateForces(robot)))
 
-    state = plant.get_state_output_port()
+    ports = {"state": plant.get_state_output_port()}
+    for system in (cables, ground):
+        given = map(system.get_output_port, range(system.num_output_ports()))
+        ports = {port.get_name(): port for port in given} | ports
     if controller is not None:
-        sources, size = (cables, ground), structure.signals
-        signals = _AddController(builder, controller, state, sources, size=size)
+        signals = _AddController(builder, controller, ports, size=structure.signals)
+    ports["signals"] = signals
     if structure.signals:
         builder.Connect(signals, cables.GetInputPort("signals"))
     if builder.HasSubsystemNamed("cables_actuators"):
-        actuators = builder.GetSubsystemByName("cables_actuators")
-        builder.ExportOutput(actuators.get_output_port(), "drives")
+        ports["drives"] = builder.GetSubsystemByName("cables_actuators").get_output_port()
     if builder.HasSubsystemNamed("cpg") and scenario.cpg.feedback:
         assert gait is not None
         feedback = Feedback(robot, gains=robot.oscillators(gait).gains)
-        _AddFeedback(builder, feedback, state, signals, ground)
+        _ConnectInputs(builder, builder.AddNamedSystem("feedback", feedback), ports)
+        cpg = builder.GetSubsystemByName("cpg")
+        builder.Connect(feedback.get_output_port(), cpg.GetInputPort("feedback"))
 
-    builder.ExportOutput(state, "state")
-    builder.ExportOutput(signals, "signals")
-    for name in ("tensions", "lengths"):
-        builder.ExportOutput(cables.GetOutputPort(name), name)
-    for name in ("normal_forces", "friction_forces", "contact_forces", "modes"):
-        if ground.HasOutputPort(name):
-            builder.ExportOutput(ground.GetOutputPort(name), name)
+    for name in _OUTPUTS:
+        if name in ports:
+            builder.ExportOutput(ports[name], name)
     if scene is not None:
         builder.ExportOutput(scene.get_query_output_port(), "query_object")
     diagram = builder.Build()
@@ -289,58 +293,34 @@ def _AddGround(
     Attach(builder, plant, builder.AddNamedSystem("ground", ground))
 
 
-def _AddFeedback(
-    builder: DiagramBuilder,
-    feedback: Feedback,
-    state: OutputPort,
-    signals: OutputPort,
-    ground: System,
-) -> None:
-    """Adds `feedback` to the diagram. Its inputs are the ports `state` and `signals`, `mode_table`
-    of the system `ground`, and the states of actuators if they have any. Its output goes to the
-    system `cpg`, which must be in the diagram."""
-    builder.AddNamedSystem("feedback", feedback)
-    builder.Connect(state, feedback.GetInputPort("state"))
-    builder.Connect(signals, feedback.GetInputPort("signals"))
-    builder.Connect(ground.GetOutputPort("mode_table"), feedback.GetInputPort("mode_table"))
-    if feedback.HasInputPort("drives"):
-        actuators = builder.GetSubsystemByName("cables_actuators")
-        builder.Connect(actuators.get_output_port(), feedback.GetInputPort("drives"))
-    cpg = builder.GetSubsystemByName("cpg")
-    builder.Connect(feedback.get_output_port(), cpg.GetInputPort("feedback"))
-
-
 def _AddController(
-    builder: DiagramBuilder,
-    controller: System,
-    state: OutputPort,
-    sources: Sequence[System],
-    *,
-    size: int,
+    builder: DiagramBuilder, controller: System, ports: Mapping[str, OutputPort], *, size: int
 ) -> OutputPort:
-    """Adds `controller` to the diagram. Its input ports are connected to `state` and to the ports
-    of `sources` with the same names; all others are exported. Returns its output port `signals`,
+    """Adds `controller` to the diagram and connects its inputs. Returns its output port `signals`,
     which must have `size` numbers. Raises InputError for a port of another size."""
     if not controller.HasOutputPort("signals"):
-        ports = map(controller.get_output_port, range(controller.num_output_ports()))
-        found = ", ".join(port.get_name() for port in ports) or "no output ports"
+        own = map(controller.get_output_port, range(controller.num_output_ports()))
+        found = ", ".join(port.get_name() for port in own) or "no output ports"
         problem = f"found {found}, expected an output port 'signals' of size {size}"
         raise InputError("MakeTensegrityDiagram", "controller", problem)
     signals = controller.GetOutputPort("signals")
     _check_size(signals, size)
-    builder.AddNamedSystem("controller", controller)
-    for i in range(controller.num_input_ports()):
-        port = controller.get_input_port(i)
-        name = port.get_name()
-        given = [source.GetOutputPort(name) for source in sources if source.HasOutputPort(name)]
-        if name == "state":
-            given = [state]
-        if not given:
-            builder.ExportInput(port, name)
-            continue
-        _check_size(port, given[0].size())
-        builder.Connect(given[0], port)
+    _ConnectInputs(builder, builder.AddNamedSystem("controller", controller), ports)
     return signals
+
+
+def _ConnectInputs(
+    builder: DiagramBuilder, system: System, ports: Mapping[str, OutputPort]
+) -> None:
+    """Connects the input ports of a system to the `ports` of the same names; all others become
+    input ports of the diagram. Raises InputError for a port of another size."""
+    for port in map(system.get_input_port, range(system.num_input_ports())):
+        name = port.get_name()
+        if name in ports:
+            _check_size(port, ports[name].size())
+            builder.Connect(ports[name], port)
+        else:
+            builder.ExportInput(port, name)
 
 
 def _check_size(port: InputPort | OutputPort, size: int, *, key: str = "controller") -> None:
@@ -378,13 +358,23 @@ def _AddSignals(
             builder.Connect(steers.get_output_port(), oscillators.GetInputPort("tonic"))
             builder.ExportInput(steers.GetInputPort("turn"), "turn")
     else:
-        samples = signal_samples(robot, gait, steering)
-        times = cpg.listing_step * np.arange(len(samples))
-        source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))
+        source = MakeSignalSource(signal_samples(robot, gait, steering), step=cpg.listing_step)
         oscillators = builder.AddNamedSystem("cpg", source)
     start_up = builder.AddNamedSystem("start_up", StartUpGate(size, start_up=cpg.start_up))
     builder.Connect(oscillators.get_output_port(0), start_up.get_input_port())
     return start_up.get_output_port()
+
+
+def MakeSignalSource(samples: np.ndarray, *, step: float) -> Diagram:
+    """Source of signals that are known beforehand, such as the signals of a command. Its output
+    port `signals` (m,) in N is linear between the `samples` (k, m) at multiples of `step` (s), and
+    holds the last ones."""
+    bends = 1 + np.flatnonzero(np.diff(samples, 2, axis=0).any(axis=1))
+    kept = np.array([0, *bends, len(samples) - 1])  # a command holds its signals for many steps
+    signals = PiecewisePolynomial.FirstOrderHold(step * kept, samples[kept].T)
+    builder, source = DiagramBuilder(), TrajectorySource(signals)
+    builder.ExportOutput(builder.AddSystem(source).get_output_port(), "signals")
+    return builder.Build()
 
 
 def _MakeCpg(network: Oscillators, *, tonic: np.ndarray, gain: float) -> OscillatorCpg:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import weakref
 from collections.abc import Sequence
 
@@ -20,7 +19,7 @@ from pydrake.systems.framework import (
     WitnessFunctionDirection,
 )
 
-from tetra_drake.errors import InputError, check_type
+from tetra_drake.errors import InputError, check_type, checked_numbers
 from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import contact
@@ -270,14 +269,8 @@ def AddGroundContact(
     placed = ground.under(contacts, carriers=carriers, radius=radii, nodes=len(nodes.p_BN))
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, ground=placed)
     if modes is not None:
-        shape = len(frames), contact.MODE_COLUMNS
-        if np.shape(modes) != shape:
-            problem = f"found shape {np.shape(modes)}, expected {shape}"
-            raise InputError("AddGroundContact", "modes", problem)
-        numbers = numbers_for_each(
-            "AddGroundContact", "modes", np.ravel(modes), count=math.prod(shape)
-        )
-        modes = numbers.reshape(shape)
+        source, shape = "AddGroundContact", (len(frames), contact.MODE_COLUMNS)
+        modes = checked_numbers(modes, shape, source=source, key="modes", finite=True)
     contacts_of = GroundContact(model, witness=witness, parameters=parameters, modes=modes)
     system = builder.AddNamedSystem(name, contacts_of)
     Attach(builder, plant, system)

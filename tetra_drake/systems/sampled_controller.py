@@ -1,4 +1,4 @@
-"""Controllers in discrete time, as LeafSystems: the signals are held between updates."""
+"""Controller in discrete time, as a LeafSystem: the signals are held between updates."""
 
 from __future__ import annotations
 
@@ -19,50 +19,8 @@ Law = Callable[[float, Readings], npt.ArrayLike]
 """Function from the time (s) and the readings of a robot to its signals (m,) in N."""
 
 
-class HeldSignals(ConvertibleSystem):
-    """Source of a robot's signals, which holds them until Hold() sets new ones.
-
-    | port    | in, out | shape | unit | meaning                                            |
-    |---------|---------|-------|------|----------------------------------------------------|
-    | signals | out     | (m,)  | N    | actuator signals, one per group of driven cables   |
-
-    After Hold(), the output changes linearly from the old signals to the new ones, within one
-    network step, the scenario's `cpg.listing_step` (s). Only at t = 0 it changes at once. Commands
-    and the actions of lab.stepping.simulation.Simulation act in the same way.
-
-    The discrete state (2m + 1,) is the m signals before the latest change, the m signals after it,
-    and the time (s) of its beginning. At the start both are the robot's first signals. The output
-    depends on state and time alone, so there is no algebraic loop.
-    """
-
-    def __init__(self, robot: Robot) -> None:
-        super().__init__()
-        self._size, self._change = robot.structure.signals, robot.scenario.cpg.listing_step
-        self.DeclareDiscreteState(np.concatenate([robot.first_signals, robot.first_signals, [0.0]]))
-        tickets = {self.xd_ticket(), self.time_ticket()}
-        DeclareOutput(self, "signals", self._size, HeldSignals._signals, tickets)
-
-    def Hold(self, context: Context, signals: np.ndarray) -> None:
-        """Sets the signals (m,) in N that are held from now on. `context` is the system's own, and
-        is changed. After t = 0 the output reaches them within one network step,
-        `cpg.listing_step`."""
-        context.SetDiscreteState(self._state_from_now(context, signals))
-
-    def _state_from_now(self, context: Context, signals: np.ndarray) -> np.ndarray:
-        """New discrete state, for a change to `signals` (m,) in N that begins now."""
-        now = context.get_time()
-        before = self._signals(context) if now > 0.0 else signals
-        return np.concatenate([before, signals, [now]])
-
-    def _signals(self, context: Context) -> np.ndarray:
-        state = context.get_discrete_state_vector().value()
-        before, after = state[: self._size], state[self._size : -1]
-        left = 1.0 - (context.get_time() - state[-1]) / self._change
-        return after - left * (after - before) if left > 0.0 else after
-
-
-class SampledController(HeldSignals):
-    """Controller of a robot: a function that sets the held signals in each control period.
+class SampledController(ConvertibleSystem):
+    """Controller of a robot: a function that sets its signals in each control period.
 
     | port          | in, out | shape         | unit | meaning                                     |
     |---------------|---------|---------------|------|---------------------------------------------|
@@ -76,15 +34,25 @@ class SampledController(HeldSignals):
     |               |         |               |      | cables                                      |
 
     The function gets the inputs as Readings. It is called at multiples of the period, from t = 0
-    on. The discrete state, the linear change to new signals and its duration are the same as in
-    HeldSignals. Steps of the simulation also end where such a change ends.
+    on. The output changes linearly from the old signals to the new ones, within one network step,
+    the scenario's `cpg.listing_step` (s), and then holds them. Only at t = 0 it changes at once.
+    Commands and the actions of lab.stepping.simulation.Simulation act in the same way. Steps of the
+    simulation also end where a change ends.
+
+    The discrete state (2m + 1,) is the m signals before the latest change, the m signals after it,
+    and the time (s) of its beginning. At the start both are the robot's first signals. The output
+    depends on state and time alone, so there is no algebraic loop.
     """
 
     def __init__(self, robot: Robot, law: Law, *, period: float) -> None:
         """Makes a controller that calls `law` once in each `period` (s). `law` gets the time (s)
         and the robot's Readings, and returns the signals (m,) in N."""
-        super().__init__(robot)
+        super().__init__()
         self._law, self._structure = law, robot.structure
+        self._size, self._change = robot.structure.signals, robot.scenario.cpg.listing_step
+        self.DeclareDiscreteState(np.concatenate([robot.first_signals, robot.first_signals, [0.0]]))
+        tickets = {self.xd_ticket(), self.time_ticket()}
+        DeclareOutput(self, "signals", self._size, SampledController._signals, tickets)
         cables, contacts = len(robot.structure.cables), len(robot.structure.contacts)
         self._state = self.DeclareVectorInputPort("state", 13 * len(robot.structure.bodies))
         self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
@@ -93,14 +61,22 @@ class SampledController(HeldSignals):
         # Ends a step. At t = 0 nothing changes.
         self.DeclarePeriodicPublishEvent(period, period + self._change, lambda _: None)
 
+    def _signals(self, context: Context) -> np.ndarray:
+        state = context.get_discrete_state_vector().value()
+        before, after = state[: self._size], state[self._size : -1]
+        left = 1.0 - (context.get_time() - state[-1]) / self._change
+        return after - left * (after - before) if left > 0.0 else after
+
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
+        now = context.get_time()
         readings = Readings.of(
             self._structure,
-            time=context.get_time(),
+            time=now,
             state=self._state.Eval(context),
             cable_forces=self._cables.Eval(context).reshape(-1, CABLE_FORCE_COLUMNS),
             ground_forces=self._ground.Eval(context).reshape(-1, GROUND_FORCE_COLUMNS),
         )
-        signals = np.asarray(self._law(context.get_time(), readings), dtype=float)
-        values.set_value(self._state_from_now(context, signals))
+        signals = np.asarray(self._law(now, readings), dtype=float)
+        before = self._signals(context) if now > 0.0 else signals
+        values.set_value(np.concatenate([before, signals, [now]]))
         return EventStatus.Succeeded()

@@ -183,18 +183,11 @@ def _set_parameter(context: Context, group: int, values: np.ndarray) -> None:
     context.get_mutable_numeric_parameter(group).SetFromVector(values)
 
 
-def _to_autodiff(system: ConvertibleSystem) -> AutoDiffTwin:
-    twin = AutoDiffTwin(system.make_again)
-    twin.set_name(system.get_name())
-    return twin
-
-
-def _to_float(twin: AutoDiffTwin) -> ConvertibleSystem:
-    system = twin.make_again()
-    system.set_name(twin.get_name())
-    return system
+def _named(made: Any, original: Any) -> Any:
+    made.set_name(original.get_name())
+    return made
 
 
 _CONVERTER = SystemScalarConverter()
-_CONVERTER._AddConstructor[AutoDiffXd, float](_to_autodiff)
-_CONVERTER._AddConstructor[float, AutoDiffXd](_to_float)
+_CONVERTER._AddConstructor[AutoDiffXd, float](lambda one: _named(AutoDiffTwin(one.make_again), one))
+_CONVERTER._AddConstructor[float, AutoDiffXd](lambda twin: _named(twin.make_again(), twin))

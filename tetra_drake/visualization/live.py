@@ -12,7 +12,7 @@ from tetra_drake.formatting import Say
 from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.world import World
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH
 from tetra_drake.visualization.replay import quiet_meshcat
 from tetra_drake.visualization.scene import (
@@ -40,7 +40,7 @@ class LiveView:
     browser is connected.
     """
 
-    def __init__(self, meshcat: Meshcat, scenario: World) -> None:
+    def __init__(self, meshcat: Meshcat, scenario: Scenario) -> None:
         self._meshcat = meshcat
         self._robot = Robot.of(scenario)
         self._started: float | None = None
@@ -75,7 +75,7 @@ class LiveView:
         self._due = (np.floor(now * FRAMES_PER_SECOND) + 1.0) / FRAMES_PER_SECOND
 
 
-def open_view(scenario: World, *, say: Say) -> LiveView:
+def open_view(scenario: Scenario, *, say: Say) -> LiveView:
     """Opens a view in a new Meshcat server. `say` gets a line of text with its web address."""
     meshcat = quiet_meshcat(MeshcatParams(host="localhost"))
     say(f"open {meshcat.web_url()} in a browser, which starts the simulation")

@@ -27,7 +27,6 @@ from tetra_drake.robot.measures import distance_walked, path_of_centre
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
 from tetra_drake.scenario.metrics import looks_for_turns
-from tetra_drake.scenario.scenario import scenario_of
 from tetra_drake.visualization.scene import (
     COLOURS,
     add_robot,
@@ -228,7 +227,7 @@ def _progress(robot: Robot, frames: xarray.Dataset, *, rolls: bool) -> dict[str,
     """What the page writes at each frame: the distance walked in the scenario's unit of length, or
     the change of heading in degrees if the objective is about turning. Keys: `what` (a verb),
     `unit`, `digits` (decimals) and `values` (frames,)."""
-    structure, objective = robot.structure, scenario_of(robot.scenario).objective
+    structure, objective = robot.structure, robot.scenario.objective
     if structure.points_ahead and looks_for_turns(objective):
         heading = np.rad2deg(path_of_centre(frames, structure).heading)
         values, what, unit, digits = heading - heading[0], "turned", "°", 0

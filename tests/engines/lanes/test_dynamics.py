@@ -6,7 +6,7 @@ from helpers.anchored import TREES, scenario_of
 from helpers.kernels import Stepper
 from helpers.states import disturbed, mass_matrix
 
-from tetra_drake.engines.lanes.dynamics import Solver, accelerate
+from tetra_drake.engines.lanes.dynamics import Solver
 from tetra_drake.engines.lanes.sparse import BLOCK
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS
@@ -16,17 +16,14 @@ from tetra_drake.laws.kinematics import move_bodies
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.terrain import Flat, Rough
-from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
-def forces_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Forces, np.ndarray]:
-    """All forces without actuation, and as forces on the bodies."""
-    stepper = Stepper(robot)
-    return stepper.forces, stepper.force_at(state, modes, np.zeros(1 + robot.cables.signal.max()))
+def force_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> np.ndarray:
+    """Force on the bodies (6 n,) without actuation."""
+    return Stepper(robot).force_at(state, modes, np.zeros(1 + robot.cables.signal.max()))
 
 
 def damping_and_stiffness(
@@ -52,33 +49,6 @@ def disturbed_robot(scenario: Scenario) -> tuple[Model, np.ndarray, np.ndarray]:
 
 
 ROUND_FEET = {"robot.struts.bar.contact_radius": "8 mm"}
-ROBOTS = [("thesis", {"robot.tetrahedra": count}) for count in (2, 5, 8)]
-ROBOTS += [("prism", {}), ("six_bar", ROUND_FEET), ("mast", {})]
-ROUGH = {"terrain": Rough(amplitude=1e-4, wavelength=0.03), "friction": Coulomb()}
-
-
-@pytest.mark.parametrize(("name", "changes"), ROBOTS)
-@pytest.mark.parametrize("ground", [{}, ROUGH])
-def test_accelerations_are_those_of_the_diagram(name, changes, ground):
-    listed = {"cpg.signals": "listing"}  # so that the diagram's only states are the robot's
-    scenario = load_scenario(name).with_changes(changes | ground | listed)
-    robot, state, modes = disturbed_robot(scenario)
-    bodies = len(robot.bodies.mass)
-    # Spin that shows gyroscopic torques, which a tetrahedron has none of.
-    state[7 * bodies :].reshape(-1, 6)[:, :3] *= 100.0
-    (forces, generalized), acceleration = forces_of(robot, state, modes), np.empty(6 * bodies)
-    accelerate(robot, forces.inertia, generalized, acceleration)
-
-    diagram = MakeTensegrityDiagram(Robot.of(scenario), seeded_gait(scenario))
-    context = diagram.CreateDefaultContext()
-    context.SetContinuousState(state)
-    ground = diagram.GetSubsystemByName("ground")
-    ground.GetMyMutableContextFromRoot(context).SetDiscreteState(0, modes.ravel())
-    expected = diagram.EvalTimeDerivatives(context).CopyToVector()[7 * bodies :]
-    # The diagram's plant makes up for the rounding of rotated inertias; both are exact to 1e-9.
-    np.testing.assert_allclose(acceleration, expected, rtol=1e-7, atol=1e-7)
-
-
 UNEVEN = Rough(amplitude=0.0005, wavelength=0.03, seed=1)
 """Ground that slopes by some degrees under the robot, of which some nodes touch it."""
 
@@ -116,7 +86,7 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(name, terrain, fric
     state[poses:] = 0.0
 
     def force_at(velocity: np.ndarray) -> np.ndarray:
-        return forces_of(robot, np.append(state[:poses], velocity), modes)[1]
+        return force_of(robot, np.append(state[:poses], velocity), modes)
 
     changes = 1e-4 * np.eye(len(state) - poses)
     jacobian = np.array([force_at(v) - force_at(-v) for v in changes]).T / 2e-4
@@ -134,7 +104,7 @@ def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
     def forces_moved(motion: np.ndarray) -> np.ndarray:
         moved = state.copy()
         move_bodies(state, motion, 1.0, moved)
-        return forces_of(robot, moved, modes)[1]
+        return force_of(robot, moved, modes)
 
     columns = [forces_moved(m) - forces_moved(-m) for m in 1e-7 * np.eye(30)]
     jacobian = np.array(columns).T / 2e-7

@@ -1,24 +1,22 @@
 """Many gaits at a time on the compiled engine: each as if it were alone."""
 
 import dataclasses
-import itertools
 import threading
 import time
 from concurrent.futures import CancelledError
+from typing import Any
 
-import numpy as np
 import pytest
-import xarray
 from helpers.actuations import SIDES
 from helpers.anchored import HUNG, scenario_of
 from helpers.brief import BRIEF
+from helpers.outcomes import assert_same
 
 from tetra_drake.engines.lanes.batch import LaneBatch, processor_lanes
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import (
     Diverged,
-    SimulationFailure,
     StepBudgetExceeded,
     TimeBudgetExceeded,
 )
@@ -28,7 +26,6 @@ from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
@@ -75,63 +72,19 @@ def short(scenario: Scenario) -> Scenario:
     return scenario.with_changes({"engine": "!Compiled", "cpg.start_up": "0.2 s", **times})
 
 
-Ending = tuple[SimulationResult | SimulationFailure, Motion]
-
-
-def batch_of(first: DrivenRobot) -> LaneBatch:
-    """A batch of one thread for robots like the first one."""
-    return LaneBatch(first, places=processor_lanes(), record=True)
-
-
-def endings(walks: list[DrivenRobot]) -> list[Ending]:
-    """Outcomes and motions in a batch whose places take the next gait when one has ended."""
-    batch = batch_of(max(walks, key=lambda walk: walk.robot.ground.heights.size))
-    batch.stop(0)
-    waiting, found, in_place = list(enumerate(walks)), dict[int, Ending](), dict[int, int]()
-    while waiting or in_place:
-        for place in [i for i in range(processor_lanes()) if i not in in_place][: len(waiting)]:
-            in_place[place], walk = waiting.pop(0)
-            assert batch.begin(place, walk)
-        batch.advance(briefly=True)
-        for place in filter(batch.ended.__getitem__, list(in_place)):
-            try:
-                outcome = batch.result(place)
-            except SimulationFailure as failure:
-                outcome = failure
-            found[in_place.pop(place)] = outcome, batch.motion(place)
-            batch.stop(place)
-    return [found[i] for i in range(len(walks))]
-
-
-def walk_of(robot: Robot, seed: int = 0) -> DrivenRobot:
-    """A robot that walks by a seeded gait."""
-    return DrivenRobot.of(robot, seeded_gait(robot.scenario, seed))
-
-
-def same(a: Ending, b: Ending) -> bool:
-    """Whether two simulations agree to the last bit, cost aside."""
-    names = ("times", "states", "signals", "modes", "drives")
-    pairs = [(getattr(a[1], name), getattr(b[1], name)) for name in names]
-    if not all(np.array_equal(x, y, equal_nan=True) for x, y in pairs):
-        return False
-    if isinstance(a[0], SimulationResult) and isinstance(b[0], SimulationResult):
-        return repr((a[0].metrics, a[0].integrator)) == repr((b[0].metrics, b[0].integrator))
-    return repr(a[0]) == repr(b[0])
-
-
 @pytest.mark.parametrize("name", NEIGHBOURS)
 def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, name):
-    changes, expected = zip(*NEIGHBOURS[name], strict=True)
-    robots = [Robot.of(short.with_changes(change)) for change in changes]
-    walks = [walk_of(robots[i % len(robots)], i) for i in range(11)]
-    alone = [endings([walk])[0] for walk in walks]
-    assert tuple(type(outcome) for outcome, _ in alone[: len(robots)]) == expected
-    assert not any(same(one, other) for one, other in itertools.pairwise(alone))
-    wound = [np.ptp(motion.drives) > 0.0 for _, motion in alone if motion.drives.size]
-    assert all(wound) and bool(wound) == ("actuation" in changes[0])
-    for order in (range(11), range(10, -1, -1)):
-        found = endings([walks[i] for i in order])
-        assert all(same(ending, alone[i]) for i, ending in zip(order, found, strict=True))
+    changes, kinds = zip(*NEIGHBOURS[name], strict=True)
+    scenarios = [short.with_changes(changes[i % len(changes)]) for i in range(11)]
+    gaits = [seeded_gait(scenario, seed) for seed, scenario in enumerate(scenarios)]
+    walks = [*zip(scenarios, gaits, strict=True)]
+    alone = [simulate_many([scenario], [gait], record=True)[0] for scenario, gait in walks]
+    assert tuple(map(type, alone[: len(changes)])) == kinds
+    assert len({repr(getattr(each, "metrics", each)) for each in alone}) == 11, "all of them differ"
+    for step in (1, -1):
+        found = simulate_many(scenarios[::step], gaits[::step], record=True, workers=1)
+        for ours, theirs in zip(found, alone[::step], strict=True):
+            assert_same(ours, theirs)
 
 
 LOSSES = [{"at": "0.2 s", "cut": ["T1-T2 outer top"]}, {"at": "0.2 s", "lose": ["T2", "T5"]}]
@@ -177,23 +130,26 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
     for workers in (1, 3):
         found = simulate_many(scenario=scenarios, gaits=gaits, record=True, workers=workers)
         for ours, theirs in zip(found, alone, strict=True):
-            assert repr(ours.metrics) == repr(theirs.metrics)  # NaN, too
-            assert (ours.fitness, ours.integrator) == (theirs.fitness, theirs.integrator)
-            xarray.testing.assert_identical(ours.trajectory, theirs.trajectory)
+            assert_same(ours, theirs)
 
 
 def test_robots_that_differ_in_numbers_alone_share_a_batch(short):
     """Else disturbed robots would walk one after another. Where tables are indexed otherwise, a
     robot needs a batch of its own."""
-    batch = batch_of(walk_of(Robot.of(short)))
+
+    def walk(changes: dict[str, Any]) -> DrivenRobot:
+        scenario = short.with_changes(changes)
+        return DrivenRobot.of(Robot.of(scenario), seeded_gait(scenario))
+
+    batch = LaneBatch(walk({}), places=processor_lanes())
     stiff = {"robot.cables.outer_stiffness": "0.21 lbf/in", "robot.cables.damping": "0.04 lbf*s/in"}
     wide = {"robot.spacing": "3 in", "ground.stiffness": "20 lbf/in"}
     moved = {"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}
     for change in (stiff, wide, moved):
-        assert batch.begin(1, walk_of(Robot.of(short.with_changes(change)))), change
+        assert batch.begin(1, walk(change)), change
     others = {"robot.tetrahedra": 3, "robot.cables.slack": True, "robot.contacts": "all"} | SIDES
     for key, value in others.items():
-        assert not batch.begin(1, walk_of(Robot.of(short.with_changes({key: value})))), key
+        assert not batch.begin(1, walk({key: value})), key
 
 
 def test_a_gait_that_is_refused_leaves_the_lanes_as_they_are(short):

@@ -10,7 +10,7 @@ from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
 from tetra_drake.scenario.structure_files import KEYS_OF_NTRT, XML_SUFFIXES
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
-from tetra_drake.settings.section import keys_of, written
+from tetra_drake.settings.section import written
 
 SCENARIO_KEYS = {"base", "robot"}
 """Keys that distinguish the files: each scenario file has one of them, and no structure file has
@@ -29,7 +29,7 @@ def format_of(name_or_file: str | Path) -> str:
         return "structure"
     if name in shipped_scenarios():
         return "scenario"
-    keys = [*keys_of(StructureFile), *SCENARIO_KEYS, *KEYS_OF_NTRT]
+    keys = [*StructureFile.model_fields, *SCENARIO_KEYS, *KEYS_OF_NTRT]
     is_file = os.path.isfile(name)
     content = read_mapping(Path(name), "structure file", keys=keys) if is_file else {}
     if not KEYS_OF_NTRT.isdisjoint(content):

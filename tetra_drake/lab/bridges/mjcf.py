@@ -1,12 +1,12 @@
 """Reader of MJCF models with tendons, as structures.
 
 Spatial tendons over sites become cables, routed ones where they have more than two sites. A body
-with a free joint becomes a rigid body, with the parts that are welded to it and with MuJoCo's mass,
-centre and inertia. Its sites are nodes. A capsule or a cylinder between two nodes is a strut. Sites
-of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0, or in
-the first key frame with velocities, with which the robot then starts. Nodes where
-spheres and capsules touch a level plane are feet, and the plane becomes the ground at z = 0. A free
-robot that is lower is raised to it.
+with a free or a ball joint becomes a rigid body, with the parts that are welded to it and with
+MuJoCo's mass, centre and inertia. Its sites are nodes. A capsule or a cylinder between two nodes is
+a strut. Sites of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0,
+or in the first key frame with velocities, with which the robot then starts. Nodes where spheres and
+capsules touch a level plane are feet, and the plane becomes the ground at z = 0. A free robot that
+is lower is raised to it.
 Actuators of tendons become oscillators. What an actuator exerts at control 0 belongs to its cable,
 or to its site. A limit of a tendon is a stiff cable.
 
@@ -129,13 +129,19 @@ class _MjcfTranslation:
         size = np.ptp(np.vstack([self.data.site_xpos, self.data.xpos]), axis=0)
         self.near = TOLERANCE * float(np.linalg.norm(size))
         """Distance up to which two points are one node."""
-        moving = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
-        self.roots = np.where(np.isin(model.body_rootid, moving), model.body_rootid, _WORLD)
-        """First body of the rigid body that each body belongs to (bodies,); 0 for the world. Only a
-        free joint parts a body from the world."""
+        self.is_ball = model.jnt_type == mujoco.mjtJoint.mjJNT_BALL
+        self.is_free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+        self.roots = np.arange(model.nbody)
+        """First body of the rigid body that each body belongs to (bodies,); 0 for the world. Only
+        free and ball joints part bodies."""
+        moving = model.jnt_bodyid[self.is_free | self.is_ball]
+        for body in np.flatnonzero(~np.isin(self.roots, moving)).tolist():
+            self.roots[body] = self.roots[model.body_parentid[body]]
         for eq in self._equalities(mujoco.mjtEq.mjEQ_WELD):
             first, second = sorted(root for root, _ in self._ends_of(eq))
             self.roots[self.roots == second] = first
+        self.joins = [*self._joins()]
+        """Name, ends and dry friction of each connect and ball joint; see _ends_of()."""
         self.laws = tendon_laws(model, self.driven)
         """Stiffness, damping and free length of each tendon, or of its limit (tendons, 3)."""
         self.is_string = model.tendon_limited & (self.laws[:, 0] <= 0.0)
@@ -150,19 +156,18 @@ class _MjcfTranslation:
     def tree(self) -> Tree:
         """Content of the structure file."""
         paths, roots = dict(self._paths()), self.roots[self.model.site_bodyid].tolist()
-        connects = self._equalities(self.mujoco.mjtEq.mjEQ_CONNECT)
         on_paths = {*itertools.chain(*paths.values())}
-        reached = {root for eq in connects for root, _ in self._ends_of(eq)}
+        reached = {root for _, ends, _ in self.joins for root, _ in ends}
         used = sorted(({roots[site] for site in on_paths} | reached) - {_WORLD})
         for root in sorted({*self.roots.tolist()} - {*used, _WORLD}):
-            self._note("bodies that no tendon and no connect reaches, left out", "body", root)
+            self._note("bodies that no tendon and no joint reaches, left out", "body", root)
         places = self._places(self.model.site_bodyid, self.model.site_pos)
         self.node_of = {
             site: self._node(root, place, self._name("site", site))
             for site, (root, place) in enumerate(zip(roots, places, strict=True))
             if site in on_paths or root in used
         }
-        joints, anchors = self._joints(connects)
+        joints, anchors = self._joints()
         level, is_touching = self._floor()
         ground = 0.0 if level is None or abs(level) < SAME_HEIGHT else level
         rods, feet = self._rods_and_feet(used, is_touching, (level or 0.0) - ground)
@@ -370,18 +375,38 @@ class _MjcfTranslation:
             "spin": [_text(x, "rad/s") for x in spin.tolist()],
         }
 
-    def _joints(self, connects: list[int]) -> tuple[Tree, Tree]:
-        """Joints, from connects of two bodies, and anchors, from connects with the world."""
+    def _joins(self) -> Iterator[tuple[str, list[tuple[int, np.ndarray]], float]]:
+        model, mujoco = self.model, self.mujoco
+        is_brake = model.actuator_forcelimited & (self.pushes[:, 2] < 0.0)
+        is_brake &= model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
+        for eq in self._equalities(mujoco.mjtEq.mjEQ_CONNECT):
+            ends = model.eq_obj2id[eq], model.eq_obj1id[eq]
+            brakes = is_brake & (model.actuator_trnid == ends).all(axis=1)
+            brakes &= model.eq_objtype[eq] == mujoco.mjtObj.mjOBJ_SITE
+            self.driven[brakes] = _NODE
+            friction = model.actuator_forcerange[brakes, 1].max(initial=0.0)
+            yield self._name("equality", eq), self._ends_of(eq), float(friction)
+        for joint in np.flatnonzero(self.is_ball).tolist():
+            body = model.jnt_bodyid[joint]
+            roots = self.roots[[model.body_parentid[body], body]].tolist()
+            places = [(root, self.data.xanchor[joint]) for root in roots]
+            friction = model.dof_frictionloss[model.jnt_dofadr[joint]]
+            yield self._name("joint", joint), places, float(friction)
+
+    def _joints(self) -> tuple[Tree, Tree]:
+        """Joints of two bodies, and anchors, from joints with the world."""
         joints: Tree = {}
         anchors: Tree = {}
-        for eq in connects:
-            ends = [(root, at) for root, at in self._ends_of(eq) if root != _WORLD]
-            name = _plain(self._name("equality", eq), joints)
+        for given, both, friction in self.joins:
+            ends = [end for end in both if end[0] != _WORLD]
+            name = _plain(given, joints)
             nodes = [self._node(*end, f"{name}-{i}") for i, end in enumerate(ends, 1)]
             if len(nodes) == 1:
                 anchors[nodes[0]] = "xyz"
+                if friction:
+                    self.notes.setdefault("friction at anchors, left out", []).append(given)
             elif len({*nodes}) > 1:
-                joints[name] = {"nodes": nodes}
+                joints[name] = {"nodes": nodes, "friction": _text(friction, "N*m")}
         return joints, anchors
 
     def _held(self, used: list[int], anchors: Tree) -> Tree:
@@ -468,14 +493,16 @@ class _MjcfTranslation:
     def _changes(self) -> Iterator[tuple[str, str, Any]]:
         """What is told of elements that are changed or left out, their kind, and a mask of them."""
         mujoco, model = self.mujoco, self.model
-        is_free, first = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, model.jnt_dofadr
-        yield "joints that are not free, read as rigid", "joint", ~is_free
+        yield "other joints, read as rigid", "joint", ~(self.is_free | self.is_ball)
         acting = {"stiffness": model.jnt_stiffness, "stiffnesspoly": model.jnt_stiffnesspoly}
+        acting["range"] = model.jnt_range
         for name in ("damping", "dampingpoly", "armature", "frictionloss"):
-            acting[name] = getattr(model, f"dof_{name}")[first]
+            acting[name] = getattr(model, f"dof_{name}")[model.jnt_dofadr]
         for name, values in acting.items():
-            is_set = is_free & np.atleast_2d(values.T).any(axis=0)
-            yield f"the {name} of free joints, left out", "joint", is_set
+            is_acting = np.atleast_2d(values.T).any(axis=0)
+            yield f"the {name} of free joints, left out", "joint", is_acting & self.is_free
+            if name != "frictionloss":
+                yield f"the {name} of ball joints, left out", "joint", is_acting & self.is_ball
         kinds = [mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD]
         is_known = np.isin(model.eq_type, kinds) & model.eq_active0.astype(bool)
         yield "other equality constraints, left out", "equality", ~is_known
@@ -499,6 +526,7 @@ class _MjcfTranslation:
             what = f"actuators with springs or forces, read at control {control:g}"
             yield what, "actuator", acts & drives & (self.control == control)
         is_limited = self.pushes[:, 1:].any(axis=1) & model.actuator_forcelimited
+        is_limited &= self.driven != _NODE
         yield "limits of the force of springs of actuators, left out", "actuator", is_limited
         of_both = np.append(model.tendon_stiffness > 0.0, False)[self.driven]
         what = "springs of actuators and their tendons, read as one, with one free length"

@@ -16,7 +16,6 @@ from tetra_drake.lab.bridges.ntrt_file import Builder, NtrtFile, Substructure
 from tetra_drake.scenario.robot_structure import MOST_NODES, MOST_PAIRS, Pair
 from tetra_drake.scenario.yaml_text import read_mapping
 from tetra_drake.settings.refusals import hint
-from tetra_drake.settings.section import keys_of
 from tetra_drake.settings.units import LARGEST
 
 MOST_PARTS = MOST_NODES // 2
@@ -84,7 +83,7 @@ class Assembly:
         if the file is among them.
         """
         if file not in self._read:
-            content = read_mapping(file, "structure file of NTRT", keys=keys_of(NtrtFile))
+            content = read_mapping(file, "structure file of NTRT", keys=NtrtFile.model_fields)
             self._read[file] = NtrtFile.from_tree(content, file)
         given = self._read[file]
         if file.resolve() in above:

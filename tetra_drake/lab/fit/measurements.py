@@ -42,7 +42,7 @@ from tetra_drake.settings.quantities import (
     different_keys,
 )
 from tetra_drake.settings.refusals import hint
-from tetra_drake.settings.section import Kinds, Section, keys_of
+from tetra_drake.settings.section import Kinds, Section
 from tetra_drake.settings.units import given_quantity
 
 SAMPLE_PERIOD = 5e-3
@@ -355,7 +355,7 @@ def load_fit_file(path: str | Path) -> FitFile:
     """Reads the YAML file of a fit: parameters to fit, and measurements. Paths in the file are
     relative to its folder. Raises InputError, naming file and key, if the content is wrong."""
     path = Path(path)
-    tree = read_mapping(path, "file of a fit", keys=keys_of(FitFile))
+    tree = read_mapping(path, "file of a fit", keys=FitFile.model_fields)
     given = FitFile.from_tree(tree, path)
     placed = []
     for measurement in given.measurements:
