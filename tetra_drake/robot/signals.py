@@ -83,14 +83,14 @@ class DrivenRobot:
     gait: Gait | None = None
     """The gait whose oscillators or policy make the signals; None if they are given."""
     steering: SteeringSignal | None = None
-    """Function from time to the turn, -1 to 1, in place of the gait's turn; None for the gait's."""
+    """Turn, or function from time to the turn, in place of the gait's turn; None for the gait's."""
     pilot: Pilot | None = None
     """The policy or controller that sets the signals while the robot moves; None without one."""
 
     @classmethod
     def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
-        """A robot driven by the oscillators of a gait. `steering`, a function from time (s) to the
-        turn (-1 to 1), replaces the gait's constant turn. For a policy see
+        """A robot driven by the oscillators of a gait. `steering`, a turn (-1 to 1) or a function
+        from time (s) to it, replaces the gait's turn. For a policy see
         robot.command.driven_robot()."""
         none = np.zeros((0, robot.structure.signals))
         return cls(robot=robot, name=gait.name, samples=none, gait=gait, steering=steering)

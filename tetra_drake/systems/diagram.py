@@ -99,7 +99,7 @@ def MakeTensegrityDiagram(
       simulation it is shown in `meshcat`, where bodies can be dragged with the mouse while Ctrl is
       held, if Drake has MeshcatMouseSpring; pages and films are made from trajectories.
 
-    `steering`, a function from the time (s) to the turn, replaces the gait's turn, -1 to 1.
+    `steering`, a turn (-1 to 1) or a function from the time (s) to it, replaces the gait's turn.
 
     Input ports of the diagram: turn of steering; signals (m,) in N without gait and
     controller, one for each of the structure's m `oscillators`; ports of the controller. Output
