@@ -137,25 +137,15 @@ class Problem:
         task: the task; its name, scenario and score.
         scenario: the task's scenario.
         space: the parameters of its gaits, or of its policy.
-        left: budget that is left, in simulated seconds.
+        left: budget that is left, in simulated seconds; spent: what is used.
     """
 
     def __init__(self, task: Task, queue: SimulationQueue, *, episodes: int = EPISODES) -> None:
         self.task, self.scenario, self._queue = task, task.scenario, queue
         self.space = ParameterSpace.of(self.scenario)
         self._duration = self.scenario.simulation.duration
-        self._left = self._budget = episodes * self._duration
+        self.left, self.spent = episodes * self._duration, 0.0
         self._evaluation = GaitEvaluation(self.scenario, SCORES[task.score])
-
-    @property
-    def left(self) -> float:
-        """Budget that is left, in simulated seconds."""
-        return self._left
-
-    @property
-    def spent(self) -> float:
-        """Simulated seconds that are used."""
-        return self._budget - self._left
 
     def evaluate(self, vectors: Sequence[Vector]) -> list[Evaluation]:
         """Evaluations of parameter vectors, one episode each. `fitness` is the score; -inf for a
@@ -171,7 +161,8 @@ class Problem:
         if not 0.0 <= seconds <= self.left + 1e-6:
             problem = f"found {seconds:g} simulated seconds, expected at most {self.left:g}"
             raise InputError("bench", self.task.name, problem)
-        self._left -= seconds
+        self.left -= seconds
+        self.spent += seconds
 
     def search(self, kind: OptimizerKind, seed: int) -> Vector:
         """The best vector that an optimiser of the package finds with the whole budget. A search
@@ -251,17 +242,14 @@ def solved(
     solutions = [_checked(one, problems[0], entry) for one in found]
     wall_time = (time.perf_counter() - started) / len(seeds)
     records: list[Record] = []
-    for seed, problem, solution in zip(seeds, problems, solutions, strict=True):
-        record: Record = {"task": task.name, "entry": entry.name, "about": entry.about}
-        record["seed"] = seed
+    digest = {"digest": entry.digest} if entry.digest else {}
+    for seed, own, solution in zip(seeds, problems, solutions, strict=True):
+        record = {"task": task.name, "entry": entry.name, "about": entry.about, "seed": seed}
         if not callable(solution):
             record["parameters"] = solution.tolist()
         record["score"] = round(task.scored(solution), DECIMALS)
-        record["simulated_s"] = round(problem.spent, 3)
-        if entry.digest:
-            record["digest"] = entry.digest
-        record["wall_s"] = round(wall_time, 2)
-        records.append(record)
+        record["simulated_s"] = round(own.spent, 3)
+        records.append(record | digest | {"wall_s": round(wall_time, 2)})
     best = max(range(len(records)), key=lambda place: records[place]["score"])
     second = task.scored(solutions[best], changes=task.second)
     records[best]["second"] = round(second, DECIMALS)
@@ -286,10 +274,9 @@ def _checked(solution: Any, problem: Problem, entry: Entry) -> Solution:
 
 def scores(records: Sequence[Record]) -> dict[tuple[str, str], np.ndarray]:
     """Scores by task and entry, in the order of the seeds."""
-    found: dict[tuple[str, str], list[float]] = {}
-    for one in sorted(records, key=lambda one: one["seed"]):
-        found.setdefault((one["task"], one["entry"]), []).append(one["score"])
-    return {place: np.array(values) for place, values in found.items()}
+    table = pandas.DataFrame(records).sort_values("seed", kind="stable")
+    groups = table.groupby(["task", "entry"], sort=False)["score"]
+    return {place: values.to_numpy() for place, values in groups}
 
 
 def shares(records: Sequence[Record]) -> dict[str, dict[str, np.ndarray]]:
@@ -347,7 +334,7 @@ def numbers(records: Sequence[Record]) -> dict[str, Any]:
             "about": own[0]["about"],
             "tasks": len(of_entries[name]),
             "share": overall(of_entries[name]),
-            "kept": np.median(kept) if kept else math.nan,
+            "kept": np.median(kept or [math.nan]),
             "time": np.median([one["wall_s"] for one in own]),
         }
     means: dict[str, dict[str, tuple[float, ...]]] = {}
@@ -355,9 +342,9 @@ def numbers(records: Sequence[Record]) -> dict[str, Any]:
         mean = float(interquartile_mean(each))
         means.setdefault(task, {})[name] = (mean, *interval(each, interquartile_mean))
     highest = {task: max(of_task, key=of_task.__getitem__) for task, of_task in means.items()}
-    by_score = sorted(records, key=lambda one: -one["score"])
-    bests = {one["task"]: one for one in reversed(by_score)}
-    best = {task.name: bests[task.name] for task in TASKS if task.name in bests}
+    best: dict[str, Record] = {}
+    for one in records:
+        best[one["task"]] = max(best.get(one["task"], one), one, key=lambda each: each["score"])
     return {"entries": entries, "means": means, "highest": highest, "best": best}
 
 

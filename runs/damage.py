@@ -25,7 +25,7 @@ from page import rendered
 from records import append, read
 from script import read_settings, run_script
 
-from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.engines.simulate import Outcome, simulate, simulate_many
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.style import OKABE_ITO, common_style, save_figure
 from tetra_drake.files import write_whole
@@ -132,20 +132,19 @@ def robots() -> list[Scenario]:
     return [disturbed(drawn, draw) for draw in fresh_draws(drawn, 0, SET["seeds"])]
 
 
-def speed_of(result: SimulationResult | Exception) -> Row:
+def speed_of(walk: Outcome) -> Row:
     """Speed (body lengths/s) of a walk, for its record. A failed simulation has the speed 0."""
-    if not isinstance(result, SimulationResult):
-        return {"failure": str(result), "speed": 0.0}
-    return {"speed": round(result.metrics.relative_speed, DECIMALS)}
+    if not isinstance(walk, SimulationResult):
+        return {"failure": str(walk), "speed": 0.0}
+    return {"speed": round(walk.metrics.relative_speed, DECIMALS)}
 
 
-def place_of(result: SimulationResult | Exception) -> Row:
+def place_of(walk: Outcome) -> Row:
     """Shares of time in the air and change of heading (rad) of a walk, for its record."""
-    if not isinstance(result, SimulationResult):
+    if not isinstance(walk, SimulationResult):
         return {"lifted_shares": [0.0] * 5, "heading_change": 0.0}
-    metrics = result.metrics
-    shares = [round(share, DECIMALS) for share in metrics.lifted_shares]
-    return {"lifted_shares": shares, "heading_change": round(metrics.heading_change, DECIMALS)}
+    shares = [round(share, DECIMALS) for share in walk.metrics.lifted_shares]
+    return {"lifted_shares": shares, "heading_change": round(walk.metrics.heading_change, DECIMALS)}
 
 
 # Trial and error
@@ -209,17 +208,17 @@ def due(walks: Sequence[Row], places: np.ndarray, before: np.ndarray) -> dict[st
     one. `before` are speeds of the gaits as shares of the recorded gait's speed.
     """
     unit = next((row["speed"] for row in walks if not row["cable"]), math.nan)
-    gaits: dict[str, int] = {}
+    gaits: dict[str, int | None] = {}
     for cable in ["", *scenario().whole_cables]:
         own = [row for row in walks if row["cable"] == cable]
         tried, speeds = [row["gait"] for row in own], [row["speed"] / unit for row in own]
         if not own:
             gaits[cable] = 0
-        elif not cable:
-            gaits |= {cable: int(np.argmax(before))} if len(own) == 1 else {}
-        elif (following := next_trial(places, before, tried, speeds)) is not None:
-            gaits[cable] = following
-    return gaits
+        elif cable:
+            gaits[cable] = next_trial(places, before, tried, speeds)
+        elif len(own) == 1:
+            gaits[cable] = int(np.argmax(before))
+    return {cable: gait for cable, gait in gaits.items() if gait is not None}
 
 
 def trials() -> None:
@@ -279,14 +278,13 @@ def outcomes(walks: Sequence[Row]) -> pandas.DataFrame:
     robot."""
     table = pandas.DataFrame(walks)
     whole = table[table["cable"] == ""].groupby("seed")["speed"].agg(["first", "last"])
-    rows = []
+    rows, counts = [], np.arange(SET["trials"] + 1)
     for (seed, cable), own in table[table["cable"] != ""].groupby(["seed", "cable"], sort=False):
         before, fastest = whole.loc[seed]
         best = np.maximum.accumulate(own["speed"].to_numpy() / before)
         row = {"seed": seed, "cable": cable, "group": group(cable), "trials": len(own) - 1}
         row |= {"lost": best[0], "found": best[-1], "of_best": best[-1] * before / fastest}
-        later = {f"best{k}": best[min(k, len(best) - 1)] for k in range(SET["trials"] + 1)}
-        rows.append(row | later)
+        rows.append(row | {f"best{k}": best[min(k, len(best) - 1)] for k in counts})
     return pandas.DataFrame(rows)
 
 

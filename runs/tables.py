@@ -105,7 +105,7 @@ class Best:
     kept: float
     """Share of disturbed robots on which it does as well; NaN if it turns."""
     unit: float
-    """Size of the unit in which distances or angles are shown."""
+    """Size (m, or rad) of the unit of shown distances or angles."""
     unit_name: str
     decimals: int = 2
     relative_speed: float = math.nan

@@ -37,21 +37,9 @@ from tetra_drake.settings.refusals import TAG
 
 HERE = Path(__file__).parent / "verification"
 RESULTS = "results.json"
-PROBLEMS: dict[str, dict[str, Any]] = yaml.safe_load((HERE / "problems.yaml").read_text("utf-8"))[
-    "problems"
-]
-ENGINES = {
-    "compiled": ("!Compiled {}", "!Compiled {tolerance: 1e-7 m/s, max_step: 0.2 ms}"),
-    "drake": ("!Drake {}", "!Drake {scheme: runge_kutta3, accuracy: 1e-7, max_step: 0.5 ms}"),
-    "mujoco": ("!Mujoco {}", "!Mujoco {step: 20 us}"),
-}
-"""Each engine at its defaults, and fine."""
-STEPS = {
-    "compiled": "!Compiled {{tolerance: 10 m/s, max_step: {} s}}",
-    "drake": "!Drake {{scheme: runge_kutta3, accuracy: 1, max_step: {} s}}",
-    "mujoco": "!Mujoco {{step: {} s}}",
-}
-"""Engines whose steps all have one length, for the order of convergence."""
+GIVEN: Any = yaml.safe_load((HERE / "problems.yaml").read_text("utf-8"))
+PROBLEMS: dict[str, dict[str, Any]] = GIVEN["problems"]
+ENGINES: dict[str, dict[str, str]] = GIVEN["engines"]
 SAMPLES = 100
 Array = np.ndarray
 
@@ -59,15 +47,9 @@ Array = np.ndarray
 def scenario_of(problem: Mapping[str, Any], case: Mapping[str, Any]) -> Scenario:
     """The scenario of a case of a problem, on the compiled engine."""
     duration = float(problem["duration"])
-    changes = {
-        "simulation.duration": f"{duration} s",
-        "simulation.steady_from": "0 s",
-        "simulation.sample_period": f"{duration / SAMPLES} s",
-        "simulation.max_evaluations": 10**9,
-        "cpg.gain": 0.0,
-        "strut_contact": "!Nothing",
-        "terrain": "!Flat" if problem.get("ground") else "!Nothing",
-    }
+    changes = GIVEN["world"] | {"terrain": "!Flat" if problem.get("ground") else "!Nothing"}
+    changes["simulation.duration"] = f"{duration} s"
+    changes["simulation.sample_period"] = f"{duration / SAMPLES} s"
     if "structure" in problem:
         changes["robot"] = {TAG: "Structure"} | dict(problem["structure"])
     changes |= problem.get("changes", {}) | problem.get("base", {})
@@ -151,7 +133,7 @@ def order_of(problem: Mapping[str, Any], name: str) -> float | None:
     """Order of convergence, from the differences of runs with a step, its half and its quarter."""
     if not (step := float(problem.get("order", {}).get(name, 0.0))):
         return None
-    runs = [run(problem, STEPS[name].format(step / 2**k))["found"] for k in range(3)]
+    runs = [run(problem, ENGINES[name]["steps"].format(step / 2**k))["found"] for k in range(3)]
     coarse, fine = (np.abs(a - b).max() for a, b in itertools.pairwise(runs))
     return math.log2(coarse / fine)
 
@@ -160,19 +142,20 @@ def verified(name: str) -> dict[str, Any]:
     """Results of a problem: curves, and for each engine the greatest errors."""
     problem = completed(name)
     if problem.get("follow") == "rest":
-        x, found, expected = getattr(references, name)()
+        x, found, expected = getattr(references, name)(problem.get("structure"))
         error = float(np.abs(np.subtract(found, expected)).max() / np.ptp(expected))
         own: dict[str, Any] = {"x": x, "expected": expected, "all": found}
         return own | {"engines": {"all": {"error": error}}}
     results: dict[str, Any] = {"engines": {}}
     is_smooth = problem.get("order") is not None
-    for engine, (default, fine) in ENGINES.items():
+    for engine, usual in ENGINES.items():
         if engine in problem.get("lacks", {}):
             continue
-        finest = problem.get("fine", {}).get(engine, "" if problem.get("long") else fine)
         numbers: dict[str, Any] = {"order": order_of(problem, engine)}
         results["engines"][engine] = numbers
-        for prefix, settings in (("", default), ("fine_", finest)):
+        fine = {} if problem.get("long") else {engine: usual["fine"]}
+        fine |= problem.get("fine", {})
+        for prefix, settings in (("", usual["default"]), ("fine_", fine.get(engine))):
             try:
                 found = run(problem, settings, drift=is_smooth) if settings else None
             except (SimulationFailure, InputError) as failure:
@@ -189,7 +172,7 @@ def completed(name: str) -> dict[str, Any]:
     """A problem with its structure."""
     problem: dict[str, Any] = {"name": name} | PROBLEMS[name]
     if made := problem.get("made"):
-        problem["structure"] = getattr(references, made[0])(*made[1:])
+        problem["structure"] = problem["structure"] | getattr(references, made[0])(*made[1:])
     return problem
 
 
@@ -238,7 +221,7 @@ def write_page(results: Mapping[str, Any]) -> None:
 def save_film(name: str) -> None:
     """Films a problem, so many times as fast as its `film` says."""
     problem = completed(name)
-    scenario = scenario_of(problem, {}).with_changes({"engine": ENGINES["compiled"][1]})
+    scenario = scenario_of(problem, {}).with_changes({"engine": ENGINES["compiled"]["fine"]})
     result = simulate(scenario, seeded_gait(scenario), record=True)
     film = {"size": (240, 180), "fps": 12.0, "view": "side", "speed": problem["film"]}
     result.save_video(HERE / f"{name}.gif", **film)

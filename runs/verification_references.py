@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import CodeType
 from typing import Any
 
@@ -76,8 +76,8 @@ def formula(times: Array, case: Case) -> Array:
 # Bodies
 
 
-def four_bar_tree(windows: int) -> dict[str, Any]:
-    """Cranks a-b and couplers between them, rods of 1 m and 1 kg."""
+def four_bar_tree(windows: int, rod: Case) -> dict[str, Any]:
+    """Cranks a-b and couplers between them."""
     nodes, pairs = {"w": [0, 9, 0]}, [[f"a{i}", f"b{i}"] for i in range(windows + 1)]
     for i in range(windows + 1):
         nodes |= {f"a{i}": [i, 0, 0], f"b{i}": [i, 0, 1]}
@@ -85,18 +85,12 @@ def four_bar_tree(windows: int) -> dict[str, Any]:
     spin = {"velocity": ["-0.5 m/s", 0, 0], "spin": [0, "1 rad/s", 0]}
     cranks = {f"a{i} b{i}": spin for i in range(windows + 1)}
     return {
-        "unit": "m",
         "nodes": nodes,
-        "struts": {"rod": BAR | {"pairs": pairs, "density": f"{1.0 / (math.pi * 4e-6)} kg/m^3"}},
-        "cables": {"cord": CORD | {"pairs": [["a0", "w"]]}},
+        "struts": {"rod": {**rod, "pairs": pairs}},
         "pinned": [f"b{i}" for i in range(windows + 1)],
         "anchors": {"w": "xyz"} | {f"a{i}": "xyz" for i in range(windows + 1)},
         "start": {"rest": False, "velocity": ["1 m/s", 0, 0], "bodies": cranks},
     }
-
-
-BAR = {"diameter": "4 mm", "node_diameter": "0 m", "contact_radius": "0 m"}
-CORD = {"stiffness": "1 N/m", "damping": "0 N*s/m", "free_length": "900 m"}
 
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 0, -1], [1, 1, -1], [0, 1, -1], [0, 1, 0]], float)
@@ -160,58 +154,37 @@ def free_body(times: Array, case: Case) -> Array:
 # Contact
 
 
-def disk_tree(count: int) -> dict[str, Any]:
-    """A disk of 0.1 m and 0.1 kg, tilted by 45 degrees, as a ring of nodes."""
+def disk_tree(count: int, disk: Case) -> dict[str, Any]:
+    """A disk of 0.1 m as a ring of nodes."""
     angles = 2.0 * np.pi * np.arange(count) / count - 0.5 * np.pi
     nodes = {f"r{i}": [0.1 * math.cos(a), 0.1 * math.sin(a), 0] for i, a in enumerate(angles)}
-    spin = DISK_RATE * math.sin(math.pi / 4) ** 2
-    moments = ["2.5e-4 kg*m^2", "2.5e-4 kg*m^2", "5e-4 kg*m^2"]
-    body = {"nodes": [*nodes], "mass": "0.1 kg", "centre": [0, 0, 0], "inertia": moments}
-    return {
-        "unit": "m",
-        "nodes": nodes | {"w": [0, 9, 0]},
-        "bodies": {"disk": body},
-        "cables": {"cord": CORD | {"pairs": [["r0", "w"]]}},
-        "anchors": {"w": "xyz"},
-        "contacts": [*nodes],
-        "start": {
-            "rest": False,
-            "turned": {"roll": "45 deg"},
-            "spin": [0, f"{spin} rad/s", f"{spin} rad/s"],
-        },
-    }
-
-
-DISK_RATE = math.sqrt(4.0 * G / (0.1 * math.sin(math.pi / 4)))
-"""Rate (rad/s) at which a tilted disk rolls on around its resting centre."""
+    body = {**disk, "nodes": [*nodes], "centre": [0, 0, 0]}
+    return {"nodes": nodes | {"w": [0, 9, 0]}, "bodies": {"disk": body}, "contacts": [*nodes]}
 
 
 # Cables
 
 
-def beads_tree(kind: str, count: int) -> dict[str, Any]:
-    """A folded chain, or a rope between two walls."""
-    if kind == "chain":
-        nodes = {
-            f"b{i}": [0.02 * (i > count / 2), 0, -0.05 * min(i, count - i)]
-            for i in range(count + 1)
-        }
-        law = {"stiffness": "2e3 N/m", "damping": "0.05 N*s/m", "free_length": "0.05 m"}
-        ends, gravity = ["b0"], f"{G} m/s^2"
-    else:
-        angles = np.pi * np.arange(count + 2) / (count + 1)
-        nodes = {f"b{i}": [0.025 * i, 0, 1e-4 * math.sin(a)] for i, a in enumerate(angles)}
-        law = {"stiffness": "1e4 N/m", "damping": "0 N*s/m", "free_length": "0.024 m"}
-        ends, gravity = ["b0", f"b{count + 1}"], "0 m/s^2"
-    names = [*nodes]
+def chain_tree(count: int, law: Case) -> dict[str, Any]:
+    """A folded chain."""
+    places = [[0.02 * (i > count / 2), 0, -0.05 * min(i, count - i)] for i in range(count + 1)]
+    return beads_tree(places, count, law)
+
+
+def rope_tree(count: int, law: Case) -> dict[str, Any]:
+    """A rope between two walls."""
+    angles = np.pi * np.arange(count + 2) / (count + 1)
+    places = [[0.025 * i, 0, 1e-4 * math.sin(a)] for i, a in enumerate(angles)]
+    return beads_tree(places, count, law)
+
+
+def beads_tree(places: Sequence[Sequence[float]], count: int, law: Case) -> dict[str, Any]:
+    """Beads of 10 g on cables; those at the ends, which are held, have no mass."""
+    nodes = {f"b{i}": place for i, place in enumerate(places)}
     return {
-        "unit": "m",
         "nodes": nodes,
-        "masses": {name: "10 g" for name in names if name not in ends},
-        "cables": {"link": law | {"pairs": [list(pair) for pair in itertools.pairwise(names)]}},
-        "anchors": dict.fromkeys(ends, "xyz"),
-        "gravity": gravity,
-        "start": {"rest": False},
+        "masses": {f"b{i}": "10 g" for i in range(1, count + 1)},
+        "cables": {"link": {**law, "pairs": [list(pair) for pair in itertools.pairwise(nodes)]}},
     }
 
 
@@ -247,32 +220,20 @@ def on_cables(times: Array, case: Case) -> Array:
 
 
 def at_rest(**tree: Any) -> EquilibriumStudy:
-    """A structure at rest. It has a slack cord besides, and no ground."""
-    given: dict[str, Any] = {"unit": "m", "gravity": 0, "struts": {}, "anchors": {}} | tree
-    given["struts"] = {k: BAR | {"density": "1200 kg/m^3"} | s for k, s in given["struts"].items()}
+    """A structure without weight at rest."""
+    given = {"unit": "m", "gravity": 0, "anchors": {}, **tree}
     return study_equilibrium(robot_of_structure(StructureFile.from_tree(given, "made"), "made"))
 
 
-def truss() -> tuple[Array, Array, Array]:
+def truss(tree: dict[str, Any]) -> tuple[Array, Array, Array]:
     whole, loads = math.hypot(1.0, 0.3), np.arange(0.0, 901.0, 180.0)
 
     def missing(h: float, load: float) -> float:
         return 2e5 * (whole / math.hypot(1.0, h) - 1.0) * h - load
 
     expected = [brentq(missing, 0.175, 0.3, (load,), xtol=1e-14) for load in loads]
-    found = [
-        at_rest(
-            nodes={"l": [-1, 0, 0], "r": [1, 0, 0], "p": [0, 0, 0.3], "w": [0, 9, 0]},
-            struts={"bar": {"pairs": [["l", "p"], ["p", "r"]], "axial_stiffness": "1e5 N/m"}},
-            pinned=["p"],
-            cables={"cord": CORD | {"pairs": [["p", "w"]]}},
-            anchors={"l": "xyz", "r": "xyz", "p": "y", "w": "xyz"},
-            anchor_stiffness="1e10 N/m",
-            joint_stiffness="1e10 N/m",
-            loads={"p": [0, 0, f"{-load} N"]},
-        ).nodes.z["p"]
-        for load in loads.tolist()
-    ]
+    downward = [{"p": [0, 0, f"{-load} N"]} for load in loads.tolist()]
+    found = [at_rest(**tree, loads=each).nodes.z["p"] for each in downward]
     return loads, np.array(found), np.array(expected)
 
 
@@ -292,11 +253,12 @@ def prism_of(count: int, twist: float, density: float, stiffness: float) -> Equi
     for name, (length, own) in sizes.items():
         free = f"{length * (1.0 - own / stiffness)!r} m"
         cables[name] = k | {"pairs": pairs[name], "free_length": free}
-    struts = {"bar": {"pairs": [[f"a{i}", f"b{j}"] for i, j in ring]}}
-    return at_rest(nodes=nodes, struts=struts, cables=cables)
+    bar: dict[str, Any] = {"diameter": "4 mm", "density": "1200 kg/m^3", "node_diameter": "0 m"}
+    bar |= {"contact_radius": "0 m", "pairs": [[f"a{i}", f"b{j}"] for i, j in ring]}
+    return at_rest(nodes=nodes, struts={"bar": bar}, cables=cables)
 
 
-def twist() -> tuple[Array, Array, Array]:
+def twist(_: Any) -> tuple[Array, Array, Array]:
     counts, found = np.arange(3, 9), []
     for count in counts.tolist():
         nodes = prism_of(count, math.pi / 2 - math.pi / count - 0.05, 10.0, 100.0).nodes
@@ -305,21 +267,20 @@ def twist() -> tuple[Array, Array, Array]:
     return counts, np.array(found), 90.0 - 180.0 / counts
 
 
-def prism_modes() -> tuple[Array, Array, Array]:
+def prism_modes(_: Any) -> tuple[Array, Array, Array]:
     shares = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
-    found = [
-        prism_of(3, math.pi / 6, 10.0 * share, 1e6).frequencies[0] ** 2 for share in shares.tolist()
-    ]
-    return shares, np.array(found) / found[0], shares
+    prisms = [prism_of(3, math.pi / 6, 10.0 * share, 1e6) for share in shares.tolist()]
+    found = np.array([prism.frequencies[0] ** 2 for prism in prisms])
+    return shares, found / found[0], shares
 
 
-def rope_modes() -> tuple[Array, Array, Array]:
-    n, known = np.arange(1, 41), at_rest(**beads_tree("rope", 40)).frequencies
+def rope_modes(tree: dict[str, Any]) -> tuple[Array, Array, Array]:
+    n, known = np.arange(1, 41), at_rest(**tree).frequencies
     expected = math.sqrt(10.0 / (0.01 * 0.025)) * np.sin(n * math.pi / 82) / math.pi
     return n, known[np.abs(known[:, None] - expected).argmin(axis=0)], expected
 
 
-def rings() -> tuple[Array, Array, Array]:
+def rings(_: Any) -> tuple[Array, Array, Array]:
     tau, fatigue, beta = 0.1, 0.6, 2.5
     found, expected = list[float](), list[float]()
     for count, weight in ((2, 1.0 + tau / fatigue), (3, 2.5), (5, 2.5)):

@@ -22,8 +22,8 @@ def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> floa
 
 @pytest.mark.parametrize("name", ["thesis", "six_bar", "mast"])
 def test_struts_are_as_far_apart_as_their_nearest_points(name):
-    # The robot as it starts, in which many struts are parallel, then bodies that are turned and
-    # moved more and more: in the end, they are all over each other, and any may be the nearest.
+    # The robot as it starts, with many parallel struts, then bodies that are turned and moved more
+    # and more: in the end, they are all over each other, and any may be the nearest.
     robot, generator = Robot.of(load_scenario(name)), np.random.default_rng(3)
     structure, struts = robot.structure, robot.structure.strut_table
     pairs = [*itertools.combinations(range(len(structure.struts)), 2)]

@@ -23,15 +23,6 @@ def robot_on_ground(scenario: Scenario) -> RobotOnGround:
     return RobotOnGround(scenario, np.eye(3))
 
 
-def test_a_stick_point_moves_by_whole_ranges_and_no_mode_changes(scenario, robot_on_ground):
-    modes, p0 = robot_on_ground.modes, scenario.friction.stiction_range
-    robot_on_ground.update()
-    for ranges, whole in ((0.9, 0.0), (1.1, 1.0), (4.7, 4.0), (3.5, 4.0), (-1.2, -1.0)):
-        assert not robot_on_ground.update(p=(ranges * p0, 0.0, -1e-5))
-        assert modes[0, MODE] == STICK
-        assert modes[0, STICK_POINT] == pytest.approx(whole * p0, abs=1e-15)
-
-
 def test_a_node_that_sticks_again_does_so_where_it_is_and_changes_are_told(scenario):
     slipping = scenario.with_changes({"friction.reset": "reversal"})
     robot_on_ground = RobotOnGround(slipping, np.eye(3))

@@ -20,7 +20,6 @@ from tetra_drake.engines.mujoco import pull_cables
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.terrain import Incline
-from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 
@@ -76,7 +75,6 @@ def compile_others(tell: Callable[[], None]) -> None:
         _prepare_engine("motors", {"engine": "!Drake", "terrain": Incline(slope=0.01)})
         robot = Robot.of(load_scenario("prism"))
         _ = robot.equilibrium
-        pitch_rates(Readings.empty(robot.structure, 1), robot.structure)
         parts, none = Packed((robot.model, Forces.of(robot.model))), np.zeros(0)
         pull_cables(parts, none, none, none, 0.0, none, none)
 

@@ -6,8 +6,6 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.kernels.compiling import compiled
-from tetra_drake.kernels.lanes import Table
 from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws import cable, contact, kinematics
 from tetra_drake.laws.forces import forces_of_motion
@@ -150,26 +148,3 @@ def bodies_state(readings: Readings, structure: Structure) -> np.ndarray:
     velocities = np.hstack([readings.w_WB, readings.v_WN[first]])
     state = np.concatenate([poses.ravel(), velocities.ravel()])
     return with_origins(state, -structure.p_BN[first])
-
-
-def pitch_rates(readings: Readings, structure: Structure) -> np.ndarray:
-    """Pitch rates (N,) in rad/s of N robots: the angular velocity of each robot as a whole about
-    the world's y axis, positive if the front goes down; see kinematics.pitch_rate()."""
-    rates = np.empty(len(readings.time))
-    write_pitch_rates(readings.p_WN, readings.v_WN, structure.first_node[-1], rates)
-    return rates
-
-
-@compiled
-def write_pitch_rates(p_WN: Table, v_WN: Table, moving: int, rates: Table) -> None:
-    """Writes the pitch rates (rad/s) of N robots to `rates` (N,); see pitch_rates().
-
-    They are from the positions p_WN (m) and velocities v_WN (m/s) of nodes (N, nodes, 3). Only the
-    first `moving` nodes count; the others are fixed to the world."""
-    nodes = np.empty((moving, kinematics.NODE_COLUMNS))
-    for robot in range(rates.size):
-        for node in range(moving):
-            for axis in range(3):
-                nodes[node, kinematics.P_WN + axis] = p_WN[robot, node, axis]
-                nodes[node, kinematics.V_WN + axis] = v_WN[robot, node, axis]
-        rates[robot] = kinematics.pitch_rate(nodes, moving)

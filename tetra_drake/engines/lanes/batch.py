@@ -108,6 +108,8 @@ class LaneBatch:
         self._log, self._places = allocate(loop.Log, sizes), allocate(Places, sizes)
         self._status = self._places.states[:, loop.STATUS]
         self._times = self._places.states[:, loop.TIME]
+        self.rolled: np.ndarray = self._places.states[:, int(state.tally.rolled[0])]
+        """Angle (rad) by which the robot in each place has rolled forward; see Tally.rolled."""
         self._heights = np.zeros((places, sizes["heights"]))
         tables = self._log, self._places, self._heights, self.readings
         self._threads = [LaneThread(first, *tables) for _ in range(min(threads, places))]

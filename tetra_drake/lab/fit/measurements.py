@@ -23,11 +23,9 @@ from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import read_bytes, read_text
 from tetra_drake.formatting import fixed
 from tetra_drake.lab.study.equilibrium import study_equilibrium
-from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.model import WORLD
 from tetra_drake.robot.command import Command, Driver
 from tetra_drake.robot.command_file import TIME_S, column_numbers, load_command, table_cells
-from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
@@ -320,21 +318,18 @@ class Rest(_Placed):
         predictions = []
         for scenario in scenarios:
             try:
-                robot = Robot.of(scenario.with_changes(self.changes))
-                rest = robot.equilibrium
+                study = study_equilibrium(scenario.with_changes(self.changes))
             except InputError:  # there may be no equilibrium with such values
                 predictions.append(Prediction(nothing))
                 continue
-            structure, unactuated = robot.structure, Unactuated(robot.model)
-            places = [_coordinates(structure.node_names).index(label) for label in self.positions]
-            cables = [structure.cable_names.index(label) for label in self.tensions]
             turn, origin = self.frame()
-            p = (node_positions(structure, rest.state) @ turn.T + origin).ravel()[places]
-            force_at_rest(unactuated, rest.state)
-            forces = unactuated.forces.cable_forces[cables, TENSION]
-            found = study_equilibrium(robot).frequencies[:modes] if modes else np.zeros(0)
+            p = study.nodes[["x", "y", "z"]].to_numpy() @ turn.T + origin
+            places = pandas.Series(p.ravel(), _coordinates(list(study.nodes.index)))
+            forces = study.cables.loc[list(self.tensions), "tension"]
+            found = study.frequencies[:modes] if modes else np.zeros(0)
             lacking = np.full(modes - len(found), np.nan)
-            predictions.append(Prediction(np.concatenate([p, forces, found, lacking])))
+            numbers = [places[list(self.positions)], forces, found, lacking]
+            predictions.append(Prediction(np.concatenate(numbers)))
         return predictions
 
 

@@ -52,7 +52,7 @@ from tetra_drake.lab.stepping.simulation import Simulation, is_list
 from tetra_drake.lab.stepping.states import States
 from tetra_drake.results.result import SimulationResult, poses_of
 from tetra_drake.robot.command import checked_actions
-from tetra_drake.robot.readings import Readings, pitch_rates
+from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario
 from tetra_drake.scenario.metrics import METRICS
@@ -80,9 +80,6 @@ _SOURCE, _MASK, _RENDERED = "tetra_drake.gym", "reset_mask", "rgb_array"
 _OF_EPISODES = (
     "start",
     "steady",
-    "time",
-    "rate",
-    "rolled",
     "offsets",
     "rewarded",
     "steps",
@@ -125,8 +122,6 @@ class _Episodes:
         self.action_space = spaces.Box(-1.0, 1.0, (self._groups.max() + 1,), np.float32)
         # Positions p_WN (N, nodes, 3) at the start and at `simulation.steady_from`.
         self._start, self._steady = start.p_WN, start.p_WN.copy()
-        # Time, pitch rate, and angle by which it has rolled, of each robot (N,).
-        self._time, self._rate, self._rolled = np.zeros(count), np.zeros(count), np.zeros(count)
         self._offsets, self._rewarded = np.zeros(count), np.zeros(count)
         self._steps, self._going = np.zeros(count, dtype=int), np.zeros(count, dtype=bool)
 
@@ -140,7 +135,6 @@ class _Episodes:
         self._steps[places], self._going[places] = 0, True
         for place in places.tolist():
             self._start[place] = self._steady[place] = readings.p_WN[place]
-            self._time[place] = self._rate[place] = self._rolled[place] = 0.0
             self._rewarded[place] = 0.0
             self._offsets[place] = self._fitness(readings, place)
         return self._observe(seen)
@@ -158,10 +152,6 @@ class _Episodes:
         seen = simulation.step(self._setpoints(actions), indices=places)
         readings = simulation.state
         self._steps[places] += 1
-        if "rolled" in self._scenario.objective:
-            rate = pitch_rates(readings, simulation.robot.structure)
-            self._rolled += 0.5 * (readings.time - self._time) * (self._rate + rate)
-            self._time, self._rate = readings.time, rate
         early = readings.time <= self._scenario.simulation.settling_time
         self._steady[early] = readings.p_WN[early]
         terminated = np.array([failure is not None for failure in simulation.failures])
@@ -209,7 +199,7 @@ class _Episodes:
         for name, weight in objective.items():
             if METRICS[name].of_pose:
                 fitness += weight * float(METRICS[name].compute(poses))
-        return fitness + objective.get("rolled", 0.0) * self._rolled[place]
+        return fitness + objective.get("rolled", 0.0) * float(self.simulation.rolled[place])
 
     def _setpoints(self, actions: np.ndarray) -> np.ndarray:
         """Setpoints (N, driven cables) of the actuators, in SI units, for actions (N, actions) of

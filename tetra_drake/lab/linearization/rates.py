@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from tetra_drake.engines.lanes.dynamics import accelerate
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws.actuator import DRIVE, RATE
 from tetra_drake.laws.forces import Forces, Parts, compute_forces, move_robot
-from tetra_drake.laws.inertia import over_inertia
 from tetra_drake.laws.model import Model
 
 
@@ -38,11 +38,4 @@ def compute_acceleration(
     robot, forces = unpacked(parts)
     move_robot(robot, state, forces)
     compute_forces(robot, state, modes, signals, True, forces, acceleration)
-    inertia = robot.bodies.inertia if robot.isotropic else forces.inertia
-    for body in range(robot.bodies.mass.size):
-        a = 6 * body
-        torque = acceleration[a], acceleration[a + 1], acceleration[a + 2]
-        spin = over_inertia(inertia, body, torque)
-        for axis in range(3):
-            acceleration[a + axis] = spin[axis]
-            acceleration[a + 3 + axis] /= robot.bodies.mass[body]
+    accelerate(robot, forces.inertia, acceleration, acceleration)

@@ -150,6 +150,12 @@ class Simulation:
         """True for each robot (N,) that has failed, or reached `simulation.duration`."""
         return self._batch.ended
 
+    @property
+    def rolled(self) -> np.ndarray:
+        """Angle (N,) in rad by which each robot has rolled forward since its start, whole turns
+        included, as in the metric of this name."""
+        return np.where(self._steps > 0, self._batch.rolled, 0.0)
+
     def reset(
         self,
         *,
