@@ -285,9 +285,7 @@ def _AddGround(
         problem = "expected an input port 'state' and an output port 'generalized_force'"
         raise InputError(source, "ground", problem)
     if robot.scenario.cpg.feedback and not ground.HasOutputPort("mode_table"):
-        raise InputError(
-            source, "ground", "expected an output port 'mode_table' for `cpg.feedback`"
-        )
+        raise InputError(source, "ground", "`cpg.feedback` needs an output port 'mode_table'")
     _check_size(ground.GetInputPort("state"), 13 * bodies, key="ground")
     _check_size(ground.GetOutputPort("generalized_force"), 6 * bodies, key="ground")
     Attach(builder, plant, builder.AddNamedSystem("ground", ground))
