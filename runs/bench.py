@@ -321,45 +321,27 @@ def scores_figure(records: Sequence[Record]) -> Figure:
     return figure
 
 
-def numbers(records: Sequence[Record]) -> dict[str, Any]:
-    """Numbers of the page: of each entry over all tasks, and interquartile means with their
-    intervals and the best solution by task."""
-    found, of_entries = scores(records), shares(records)
-    entries: dict[str, Any] = {}
-    for name in entry_names(records):
-        own = [one for one in records if one["entry"] == name]
-        seconds = [one for one in own if one.get("second") and one["score"] > 0]
-        kept = [one["second"] / one["score"] for one in seconds]
-        entries[name] = {
-            "about": own[0]["about"],
-            "tasks": len(of_entries[name]),
-            "share": overall(of_entries[name]),
-            "kept": np.median(kept or [math.nan]),
-            "time": np.median([one["wall_s"] for one in own]),
-        }
-    means: dict[str, dict[str, tuple[float, ...]]] = {}
-    for (task, name), each in found.items():
-        mean = float(interquartile_mean(each))
-        means.setdefault(task, {})[name] = (mean, *interval(each, interquartile_mean))
-    highest = {task: max(of_task, key=of_task.__getitem__) for task, of_task in means.items()}
-    best: dict[str, Record] = {}
-    for one in records:
-        best[one["task"]] = max(best.get(one["task"], one), one, key=lambda each: each["score"])
-    return {"entries": entries, "means": means, "highest": highest, "best": best}
+def means(records: Sequence[Record]) -> pandas.DataFrame:
+    """Interquartile means by task and entry, with their 95 % intervals."""
+    rows = [
+        [*place, interquartile_mean(values), *interval(values, interquartile_mean)]
+        for place, values in scores(records).items()
+    ]
+    table = pandas.DataFrame(rows, columns=["task", "entry", "mean", "low", "high"])
+    return pandas.concat([of_task for _, of_task in table.groupby("task", sort=False)])
 
 
 def intervals(records: Sequence[Record]) -> str:
-    """Interquartile means with their 95 % intervals as CSV."""
-    means = numbers(records)["means"]
-    rows = [[task, name, *each] for task, own in means.items() for name, each in own.items()]
-    columns = ["task", "entry", "mean", "low", "high"]
-    return str(pandas.DataFrame(rows, columns=columns).to_csv(index=False, float_format="%.6g"))
+    """Table of the means as CSV."""
+    return str(means(records).to_csv(index=False, float_format="%.6g"))
 
 
 def page(records: Sequence[Record]) -> str:
     """Text of the page, from the records."""
     settings = {"tasks": TASKS, "episodes": EPISODES, "seeds": SEEDS, "least": LEAST_SPEED}
-    return rendered("bench.md", **settings, **numbers(records))
+    tables: dict[str, Any] = {"table": pandas.DataFrame(records), "means": means(records)}
+    tables |= {"names": entry_names(records), "shares": shares(records), "overall": overall}
+    return rendered("bench.md", **settings, **tables)
 
 
 def main(files: Sequence[str]) -> None:

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import page
 import xarray
-from page import rendered
 from scipy.spatial.transform import Rotation
 from script import evolved, read_record, run_script
 from settle import difference_of_means
@@ -227,8 +227,7 @@ def make_record() -> dict[str, Any]:
 
 def over(values: np.ndarray, digits: int = 0) -> str:
     """Median and range of values as text."""
-    middle, low, high = (fixed(f(values), digits) for f in (np.median, np.min, np.max))
-    return f"{middle} ({low} to {high})"
+    return page.over([np.median(values), np.min(values), np.max(values)], digits)
 
 
 def each(values: np.ndarray, digits: int = 0) -> str:
@@ -261,7 +260,7 @@ def claims(record: Mapping[str, Any]) -> TextTable:
     alike, *directional = numbers["friction"]["evolved"]
     gains = listed([ranged(*difference_of_means(alike, inches)) for inches in directional])
     tools = {"over": over, "each": each, "verdict": verdict, "listed": listed, "gains": gains}
-    text = rendered("claims", **numbers, **tools)
+    text = page.rendered("claims", **numbers, **tools)
     headings = ["claim of the thesis", "criterion", "result, median (range)", "verdict"]
     return TextTable(headings, [line.split(" | ") for line in text.splitlines()], range(4))
 

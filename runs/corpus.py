@@ -28,7 +28,6 @@ from script import read_settings, run_script
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import rounded
 from tetra_drake.lab.study.equilibrium import EquilibriumStudy, robot_of_file, study_equilibrium
 from tetra_drake.laws.capsules import NoStrutContact
 from tetra_drake.laws.terrain import Nothing
@@ -159,16 +158,8 @@ def tables(rows: dict[str, dict[str, Any]]) -> tuple[pd.DataFrame, pd.DataFrame]
 
 def page(structures: pd.DataFrame, known: pd.DataFrame) -> str:
     """Content of README.md."""
-    apart = (known["ours"] / known["known"] - 1.0).abs()[known["known"] != 0.0]
-    farthest = {one: pd.to_numeric(structures[of], "coerce").max() for one, of in MOVES.items()}
-    return rendered(
-        "corpus.md",
-        structures=structures,
-        known=known,
-        sizes=structures[[*SIZES.values()]].quantile([0.0, 0.5, 1.0]),
-        apart=apart.max(),
-        moves=[f"{rounded(1e9 * far)} nm ({one})" for one, far in farthest.items()],
-    )
+    moves = {one: pd.to_numeric(structures[of], "coerce").max() for one, of in MOVES.items()}
+    return rendered("corpus.md", structures=structures, known=known, sizes=SIZES, moves=moves)
 
 
 def csv(table: pd.DataFrame) -> str:

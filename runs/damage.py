@@ -337,20 +337,9 @@ def speed_figure(shares: pandas.DataFrame, plans: pandas.DataFrame) -> Figure:
 
 def page(walks: Sequence[Row], plan_rows: Sequence[Row], candidates: Sequence[Row]) -> str:
     """Text of the page."""
-    shares, by_plan = outcomes(walks), planned(plan_rows)
-    is_whole = by_plan["cable"] == ""
-    return rendered(
-        "damage.md",
-        walks=walks,
-        gaits=candidates,
-        shares=shares,
-        medians=shares[["of_best", "lost", "found"]].median(),
-        plans=by_plan[~is_whole],
-        whole=by_plan[is_whole].iloc[0],
-        cpu=by_plan["cpu_s"].median(),
-        steady=scenario().simulation.settling_time,
-        set=SET,
-    )
+    tables = {"walks": walks, "gaits": candidates, "shares": outcomes(walks), "set": SET}
+    steady = scenario().simulation.settling_time
+    return rendered("damage.md", **tables, plans=planned(plan_rows), steady=steady)
 
 
 def main(_: Sequence[str] = ()) -> None:

@@ -36,7 +36,13 @@ from measured_robots import (
 from page import percent, rendered
 from script import run_script
 
-from tetra_drake.figures.style import LINE_COLOURS, common_style, line_style, save_figure
+from tetra_drake.figures.style import (
+    LINE_COLOURS,
+    common_style,
+    line_style,
+    make_figure,
+    save_figure,
+)
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed
 from tetra_drake.lab.predict.predict import interval_text
@@ -71,9 +77,8 @@ class Score(NamedTuple):
         text = percent((error / rows["measured"]).abs().median(), 1)
         if (rows["kind"] == "shape").all():
             text = f"{fixed(error.abs().median(), 1)} mm"
-        return cls(
-            len(rows), int(holds(rows).sum()), text, float(np.sqrt(((error / half) ** 2).mean()))
-        )
+        rms = float(np.sqrt(((error / half) ** 2).mean()))
+        return cls(len(rows), int(holds(rows).sum()), text, rms)
 
 
 def totals(rows: pandas.DataFrame, by: str) -> dict[str, Score]:
@@ -98,8 +103,7 @@ BAR: Any = {"linewidth": 3.0, "alpha": 0.5}
 @common_style()
 def intervals_figure(rows: pandas.DataFrame) -> Figure:
     """Measured values beside intervals, each in units of half the width of its interval."""
-    figure = Figure(figsize=(7.0, 3.0), layout="constrained")
-    axes = figure.subplots()
+    figure, ((axes,),) = make_figure(width_in=7.0, height_in=3.0)
     deviation = 2.0 * (rows["measured"] - rows["low"]) / (rows["high"] - rows["low"]) - 1.0
     places, names = pandas.Series(0.0, index=rows.index), []
     for column, (name, group) in enumerate(rows.groupby("structure", sort=False)):
@@ -122,8 +126,7 @@ def intervals_figure(rows: pandas.DataFrame) -> Figure:
 @common_style()
 def simplex_figure(under_load: pandas.DataFrame) -> Figure:
     """Height and cable forces of the simplex over the load."""
-    figure = Figure(figsize=(7.0, 3.2), layout="constrained")
-    heights, forces = figure.subplots(1, 2)
+    figure, ((heights, forces),) = make_figure(width_in=7.0, height_in=3.2, columns=2)
     forces_of = {"CV": "vertical", "CB": "bottom", "CT": "top"}
     for axes, kinds in ((heights, {"H": "upper nodes"}), (forces, forces_of)):
         for number, (kind, label) in enumerate(kinds.items()):
@@ -142,8 +145,7 @@ def simplex_figure(under_load: pandas.DataFrame) -> Figure:
 @common_style()
 def spine_figure(poses: pandas.DataFrame) -> Figure:
     """Paths of the spine's vertebra in its tests: predicted, wanted and seen by the camera."""
-    figure = Figure(figsize=(7.0, 3.2), layout="constrained")
-    place, angle = figure.subplots(1, 2)
+    figure, ((place, angle),) = make_figure(width_in=7.0, height_in=3.2, columns=2)
     line = {"linestyle": "-", "color": LINE_COLOURS[1], "linewidth": 2.0}
     dots = {"linestyle": "", "marker": ".", "color": LINE_COLOURS[2], "markersize": 3.0}
     for _, test in poses.groupby("test"):
@@ -163,8 +165,8 @@ def spine_figure(poses: pandas.DataFrame) -> Figure:
 @common_style()
 def jump_figure(jumps: dict[float, list[tuple[float, float]]]) -> Figure:
     """Rise of the jumper over the share that is wound up."""
-    figure = Figure(figsize=(5.0, 3.2), layout="constrained")
-    axes, shares = figure.subplots(), 100.0 * np.array(list(jumps))
+    figure, ((axes,),) = make_figure(width_in=5.0, height_in=3.2)
+    shares = 100.0 * np.array(list(jumps))
     for number, damping in enumerate(SPRING_DAMPINGS):
         rises = [results[number][0] for results in jumps.values()]
         style = line_style(number + 1)
@@ -236,17 +238,14 @@ def table(rows: pandas.DataFrame) -> str:
 
 def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> str:
     """Text of the page from of_simulations() and measured_rows()."""
-    blind, kinds = rows["blind"], ["structure", "kind"]
-    blindest = blind[blind["structure"].isin(BLINDEST)]
     return rendered(
         "measured.md",
         **simulated,
         measured_rises=[*JUMPS.values()],
-        rows={name: each.to_dict("records") for name, each in rows.items()},
-        by={column: totals(rows["known"], column) for column in kinds},
-        blind={key: Score.of(each) for key, each in blind.groupby(kinds, sort=False)},
-        anew={key: Score.of(each) for key, each in rows["anew"].groupby(kinds)},
-        blindest={"the three blindest": Score.of(blindest), "all": Score.of(blind)},
+        rows=rows,
+        totals_of=totals,
+        score_of=Score.of,
+        blindest=BLINDEST,
         hash=hashlib.sha256((HERE / "blind.csv").read_bytes()).hexdigest(),
         interval_text=interval_text,
         shortened=shortened,

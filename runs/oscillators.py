@@ -21,6 +21,7 @@ from typing import Any
 
 import cma
 import numpy as np
+import pandas
 from matplotlib.figure import Figure
 from page import rendered
 from record import SCRATCH, load_experiments
@@ -167,15 +168,12 @@ def judged(run: Run, trial: int) -> dict[str, Any]:
 
 def numbers(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Numbers of the page: medians and ranges of the trials, by experiment."""
-    found = {}
-    for name in dict.fromkeys(one["experiment"] for one in records):
-        own = [one for one in records if one["experiment"] == name]
-        inches = np.array([one["distances_in"] for one in own])
+    found, rest = {}, ["peak_n", "frequency_hz", "rough_in", "steps_in", "kept"]
+    for name, own in pandas.DataFrame(records).groupby("experiment", sort=False):
+        inches, lags = (np.array([*own[key]]) for key in ("distances_in", "lags_deg"))
         spread = np.array([np.median(inches, 0), inches.min(0), inches.max(0)]).T
-        rest = ("peak_n", "frequency_hz", "rough_in", "steps_in", "kept")
-        medians = {key: float(np.median([one[key] for one in own])) for key in rest}
-        lags = np.median([one["lags_deg"] for one in own], axis=0)
-        found[name] = {"trials": inches[:, -1], "spread": spread, "lags": lags, **medians}
+        rows = {"trials": inches[:, -1], "spread": spread, "lags": np.median(lags, axis=0)}
+        found[str(name)] = rows | own[rest].astype(float).median().to_dict()
     return found
 
 

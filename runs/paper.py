@@ -59,21 +59,18 @@ def released(citation: Path = CITATION) -> datetime.date:
 
 def paper() -> str:
     """Text of the paper, whose date is the day of the last release."""
-    rows, runs = corpus_rows(), tables.load_all()
-    trials = runs["thesis"].best_gaits
-    differences, predictions = tables.differences(runs), measured_rows()
+    rows, runs, predictions = corpus_rows(), tables.load_all(), measured_rows()
     return rendered(
         "paper.md",
         date=f"{released():%-d %B %Y}",
-        experiments=len(runs),
-        evaluations=trials["evaluations"].sum(),
+        runs=runs,
         corpus=rows,
         by_size=by_size(rows),
         sizes=SIZES,
         engines=ENGINES,
-        apart=differences[differences["coulomb"]],
+        differences=tables.differences(runs),
         far=tables.APART / INCH,
-        best={name: tables.best_gait(name, runs[name]) for name in ("thesis", "coulomb")},
+        best=tables.best_of_all(runs),
         kinds=totals(predictions["known"], "kind"),
         blind=Score.of(predictions["blind"]),
     )

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -33,8 +31,6 @@ GROUPS = [*dict.fromkeys(row["group"] for row in EPISODES["episodes"])]
 """Groups of episodes, in the order of the runs."""
 NEAR, PILLAR = 0.3, 0.1
 """Distance (m) of the centre from a goal that is reached, and radius (m) of pillars."""
-CORES = 2
-"""Number of cores that a decision may use for its whole period."""
 FRAME, COLOURS = 0.2, 12
 """Time between the film's pictures in s, and number of their colours."""
 VIEW, TALL = math.radians(40.0), 0.6
@@ -150,13 +146,12 @@ def speeds(records: Sequence[Record], name: str) -> np.ndarray:
     return np.percentile(found or [math.nan], [50, 0, 100])
 
 
-def costs(times: Sequence[Sequence[float]], limit: float) -> dict[str, float]:
-    """Number of decisions and numbers of their times (s), a list for each episode, with the share
-    within a limit (s)."""
-    decisions = np.concatenate(times)
-    middle, most_of, most = np.percentile(decisions, [50, 95, 100])
-    kept = float(np.mean(decisions <= limit))
-    return {"count": len(decisions), "median": middle, "p95": most_of, "most": most, "kept": kept}
+def costs(records: Sequence[Record], key: str, limit: float) -> dict[str, float]:
+    """Number of decisions in episodes and numbers of their times (s), with the share within a limit
+    (s)."""
+    times = np.concatenate([record[key] for record in records])
+    found = {"count": len(times), "kept": float(np.mean(times <= limit))}
+    return found | {"median": np.median(times), "mean": times.mean(), "most": times.max()}
 
 
 def write_page(folder: Path, episodes: Sequence[Any]) -> None:
@@ -168,30 +163,14 @@ def write_page(folder: Path, episodes: Sequence[Any]) -> None:
     goals = {name: records for name, records in groups.items() if name.startswith("goals")}
     save_figure(goals_figure(goals), folder, "goals", kinds=["svg"])
     save_figure(courses_figure(groups["courses"]), folder, "courses", kinds=["svg"])
-    plants, period = EPISODES["engines"], EPISODES["planner"]["decision_period"]
-    found = partial(speeds, groups["speeds"])
-    level = {
-        ground: {plant: found(f"{ground}, {plant}, seed") for plant in plants}
-        for ground in EPISODES["grounds"]
-    }
-    cpu = {name: [each["cpu"] for each in of] for name, of in groups.items() if of}
-    walls = [record["wall"] for record in groups["real time"]]
-    of_goals = itertools.chain(*(times for name in goals for times in cpu.get(name, [])))
     text = rendered(
         "planning.md",
         given=EPISODES,
         episodes=episodes,
-        planned=Counter(each.group for each in episodes),
         groups=groups,
         goals=goals,
-        costs={name: costs(times, CORES * period) for name, times in cpu.items()},
-        walls=costs(walls, period) if walls else None,
-        level=level,
-        medians=[[middle for middle, *_ in each.values()] for each in level.values()],
-        found=found,
-        others={record["name"]: record for record in groups["others"]},
-        film=FILM,
+        costs=costs,
+        found=partial(speeds, groups["speeds"]),
         evolved=load_times(HERE.parent)["rolling"]["evolution"]["cores_s"],
-        second=float(np.mean([*of_goals])) / period,
     )
     write_whole(folder / "README.md", text)

@@ -20,7 +20,7 @@ import pandas
 from script import chosen, evolved, read_record, read_settings, run_script
 
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.files import check_file, write_whole
+from tetra_drake.files import check_file, read_json, write_whole
 from tetra_drake.formatting import ranged
 from tetra_drake.lab.study.statistics import interval_of_resamples, resampled
 from tetra_drake.optimizers.steady_state import has_levelled_off
@@ -142,14 +142,9 @@ def factor_interval(trials: pandas.DataFrame) -> tuple[float, float]:
     return interval_of_resamples(factor(trials, drawn=drawn))
 
 
-def load_record(path: Path) -> Record:
-    """The recorded trials by reading. Raises InputError if the record cannot be read."""
-    return read_record(path, _checked, "readings.py")
-
-
-def _checked(record: Record) -> Record:
-    tables_of(record)
-    return record
+def load_tables() -> dict[str, pandas.DataFrame]:
+    """The recorded trials, see tables_of(). Raises InputError if the record cannot be read."""
+    return read_record(RECORD, tables_of, "readings.py")
 
 
 def tables_of(record: Record) -> dict[str, pandas.DataFrame]:
@@ -170,12 +165,12 @@ def main(names: Sequence[str]) -> None:
     names = chosen(names, ALL)
     check_file(RECORD)
     for name in names:
-        record = load_record(RECORD) if RECORD.exists() else {}
+        record = read_json(RECORD, "record") if RECORD.exists() else {}
         if name not in record:
             made = record | {name: numbers(name)}
             text = json.dumps({key: made[key] for key in ALL if key in made}, indent=1)
             write_whole(RECORD, text + "\n")
-    for name, trials in tables_of(load_record(RECORD)).items():
+    for name, trials in load_tables().items():
         print(f"{name}: off by a factor of {off_by(trials)}")
 
 

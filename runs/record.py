@@ -38,7 +38,7 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.formatting import duration
 from tetra_drake.lab.elites.elites import judge_elites
 from tetra_drake.machine import available_cores
@@ -145,25 +145,18 @@ def publish(
             judge_elites(made)
             analyse(made, workers=available_cores())
     with timed(name, "pages", out):
-        make_folder(made, shown, initial=experiment.initial, whole=whole)
+        for old in shown.glob("trial_*"):
+            shutil.rmtree(old)
+        thin(made, shown, initial=experiment.initial, whole=whole)
         show(shown, film=experiment.film)
     shutil.copy(analysis, shown / ANALYSIS)
-
-
-def make_folder(made: Path, shown: Path, *, initial: bool = False, whole: bool = False) -> None:
-    """Thins a run into the folder `shown`, in place of its old trials; or copies its record, if it
-    is to be `whole`."""
-    for old in shown.glob("trial_*"):
-        shutil.rmtree(old)
-    thin(made, shown, initial=initial, whole=whole)
 
 
 def load_times(out: Path) -> dict[str, Any]:
     """Times of the experiments recorded in the folder `out`: wall_s and cores_s (s) by name and
     stage."""
     file = out / TIMES
-    times: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-    return times
+    return read_json(file, "times") if file.exists() else {}
 
 
 def save_times(times: Mapping[str, Any], out: Path) -> None:

@@ -23,7 +23,7 @@ from analyse import DRAWN, MUJOCO, SPEED, TIGHT, TURNED, Analysis, load_analysis
 from page import rendered
 from parting import partings
 from PIL import Image
-from readings import RECORD, load_record
+from readings import load_tables
 from record import EXPERIMENTS, PICTURE
 from script import run_script
 from settle import settled
@@ -32,7 +32,7 @@ from sine import TRIED, load_sines
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import fixed, rounded, uncertain
+from tetra_drake.formatting import fixed, uncertain
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import looks_for_turns
@@ -46,9 +46,6 @@ README = "README.md"
 
 APART = 0.3 * INCH
 """Largest difference (m) of distances on two engines that a page does not mention."""
-
-HEIGHT = 96
-"""Height of pictures in the gallery's table, in pixels."""
 
 ENGINES = ("compiled", "diagram", "MuJoCo")
 
@@ -69,12 +66,6 @@ def load_all(directory: Path = HERE) -> dict[str, Analysis]:
     """Existing recorded runs, in the order of EXPERIMENTS."""
     there = (name for name in EXPERIMENTS if (directory / name / MANIFEST).exists())
     return {name: load_analysis(directory / name) for name in there}
-
-
-def shown(name: str, file: str, about: str) -> str:
-    """HTML of a picture of a run, HEIGHT high. It has a width, too: pages shrink wide pictures."""
-    width = round(HEIGHT * aspect(HERE / name / file))
-    return f'<img src="{name}/{file}" width="{width}" alt="{about}">'
 
 
 def aspect(picture: Path) -> float:
@@ -113,11 +104,6 @@ class Best:
     known: tuple[float, float] = (math.nan, math.nan)
     """Range of all distances (m) that are known of this gait under its law of friction: on the
     engines, in starts moved by 1 nm, and on 90 % of disturbed robots. NaN if it turns."""
-
-    @property
-    def speed(self) -> str:
-        """Speed in body lengths per second as text; "-" if it is NaN."""
-        return rounded(self.relative_speed, 2)
 
     def text(self, engine: str, digits: int = 2) -> str:
         """The distance, or the angle, on an engine."""
@@ -165,8 +151,8 @@ def distances_of(run: Analysis, trial: int) -> np.ndarray:
 
 def gallery_table(runs: Runs) -> str:
     """Table of all runs with what their best gaits reach."""
-    bests, files = best_of_all(runs), {"README": README, "PICTURE": PICTURE, "shown": shown}
-    return rendered("gallery.md", bests=bests, **files)
+    files = {"README": README, "PICTURE": PICTURE, "HERE": HERE, "aspect": aspect}
+    return rendered("gallery.md", bests=best_of_all(runs), **files)
 
 
 def differences(runs: Runs) -> pandas.DataFrame:
@@ -192,17 +178,14 @@ def differences(runs: Runs) -> pandas.DataFrame:
 
 def trust_table(runs: Runs) -> str:
     """Table of the differences between engines and their causes, by law of friction."""
-    found = differences(runs).groupby("coulomb")
-    median, most = (found[["diagram", "nanometre", "mujoco"]].agg(of) for of in ("median", "max"))
-    counts = found["run"].nunique(), found.size()
-    return rendered("trust.md", median=median, most=most, runs=counts[0], gaits=counts[1])
+    return rendered("trust.md", laws=differences(runs).groupby("coulomb"))
 
 
 def results_table(runs: Runs) -> str:
     """Table of the thesis's results and ours, for README.md."""
-    names, record = {"thesis": "thesis", "thesis-listing": "listing"}, load_record(RECORD)
+    names, tables = {"thesis": "thesis", "thesis-listing": "listing"}, load_tables()
     best = [best_gait(name, runs[name]) for name in names]
-    trials = [pandas.DataFrame(record[reading]) for reading in names.values()]
+    trials = [tables[reading] for reading in names.values()]
     return rendered("results.md", names=[*names], best=best, trials=trials)
 
 
@@ -232,21 +215,16 @@ def pages(runs: Runs) -> list[Path]:
 
 def made_again(page: Path, runs: Runs) -> str:
     """Text of a page with new tables. Raises InputError if the page cannot be read."""
-
     name = page.parent.name
-
-    def make_table(table: str) -> str:
-        tables = {
-            "results": lambda: results_table(runs),
-            "gallery": lambda: gallery_table(runs),
-            "trust": lambda: trust_table(runs),
-            "trials": lambda: trials_table(name, runs),
-            "settled": lambda: settled(HERE / OTHERS[name], HERE / name).markdown(),
-            "partings": lambda: partings_table(name, "thesis"),
-        }
-        return tables[table]()
-
-    return filled(read_text(page, "page"), make_table)
+    tables = {
+        "results": lambda: results_table(runs),
+        "gallery": lambda: gallery_table(runs),
+        "trust": lambda: trust_table(runs),
+        "trials": lambda: trials_table(name, runs),
+        "settled": lambda: settled(HERE / OTHERS[name], HERE / name).markdown(),
+        "partings": lambda: partings_table(name, "thesis"),
+    }
+    return filled(read_text(page, "page"), lambda table: tables[table]())
 
 
 def filled(text: str, make_table: Callable[[str], str]) -> str:

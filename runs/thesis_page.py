@@ -20,7 +20,7 @@ import readings
 import xarray
 from analyse import load_analysis
 from claims import MOTION, claims
-from page import rendered
+from page import over, rendered
 from record import load_times
 from script import read_record, run_script
 from settle import difference_of_means, numbers
@@ -69,8 +69,7 @@ def setting(label: str, given: Any, key: str) -> str:
 
 def over_trials(values: pandas.Series, digits: int = 2) -> str:
     """Mean and range of numbers of the trials."""
-    low, high = fixed(values.min(), digits), fixed(values.max(), digits)
-    return f"{fixed(values.mean(), digits)} ({low} to {high})"
+    return over([values.mean(), values.min(), values.max()], digits)
 
 
 def two_best(run: Run, trial: int) -> pandas.Series:
@@ -217,7 +216,7 @@ def simulated_numbers(run: Run) -> dict[str, Any]:
 def page(run: Run, simulated: Mapping[str, Any]) -> str:
     """Text of the page, with simulated_numbers()."""
     sines = load_sines()
-    tables = readings.tables_of(readings.load_record(readings.RECORD))
+    tables = readings.load_tables()
     return rendered(
         "thesis.md",
         ours=trials_numbers(run),

@@ -101,8 +101,7 @@ def followed(problem: Mapping[str, Any], result: SimulationResult) -> Array:
 def run(problem: Mapping[str, Any], engine: str, *, drift: bool = False) -> dict[str, Any]:
     """What an engine finds: curves `x`, `found` and `expected`, their `size`, the greatest error as
     a share of it, drift of energy (J), and wall time `s` (s)."""
-    x, found, expected, drifts = (list[float]() for _ in range(4))
-    wall = 0.0
+    parts, drifts, wall = [], [], 0.0
     cases = problem.get("cases", [{}])
     for number, case in enumerate(cases):
         bristles = "0 N/m" if engine.startswith("!Mujoco") else "30 kN/m"
@@ -122,10 +121,11 @@ def run(problem: Mapping[str, Any], engine: str, *, drift: bool = False) -> dict
             drifts.append(float(np.abs(energy - energy[0]).max()))
         if len(cases) > 1:
             times, values, right = np.array([number]), values[-1:], right[-1:]
-        x, found, expected = [*x, *times], [*found, *values], [*expected, *right]
+        parts.append([times, values, right])
+    x, found, expected = (np.concatenate(part) for part in zip(*parts, strict=True))
     size = float(np.ptp(expected)) or 1.0
-    error = float(np.abs(np.subtract(found, expected)).max() / size)
-    curves = {"x": np.array(x), "found": np.array(found), "expected": np.array(expected)}
+    error = float(np.abs(found - expected).max() / size)
+    curves = {"x": x, "found": found, "expected": expected}
     return curves | {"size": size, "error": error, "drift": max(drifts, default=None), "s": wall}
 
 
@@ -187,34 +187,19 @@ def curves(result: Mapping[str, Any]) -> str:
     values = np.concatenate([*map(np.asarray, lines.values())])
     low, size = values.min(), np.ptp(values) or 1.0
     across = 4.0 + 152.0 * (x - x.min()) / (np.ptp(x) or 1.0)
-    shapes = []
+    points = {}
     for colour, line in lines.items():
         up = 56.0 - 52.0 * (np.asarray(line) - low) / size
-        points = " ".join(f"{a:.0f},{b:.1f}" for a, b in zip(across, up, strict=True))
-        width = 4 if colour == "#bbb" else 1
-        if len(x) > 20:
-            shapes.append(f'<polyline points="{points}" stroke="{colour}" stroke-width="{width}"/>')
-            continue
-        dots = "".join(f"M{point}h0" for point in points.split())
-        shapes.append(f'<path d="{dots}" stroke="{colour}" stroke-width="{2 * width + 2}"/>')
-    box = 'viewBox="0 0 160 60" width="160" height="60" fill="none" stroke-linecap="round"'
-    return f'<svg xmlns="http://www.w3.org/2000/svg" {box}>{"".join(shapes)}</svg>\n'
+        points[colour] = [f"{a:.0f},{b:.1f}" for a, b in zip(across, up, strict=True)]
+    return rendered("curves.svg", lines=points)
 
 
 def write_page(results: Mapping[str, Any]) -> None:
     """Writes the page from the results by problem."""
-    seconds = sum(
-        x.get("s", 0.0) + x.get("fine_s", 0.0)
-        for r in results.values()
-        for x in r["engines"].values()
-    )
-    text = rendered(
-        "verification.md",
-        problems=PROBLEMS,
-        results=results,
-        engines=[*ENGINES],
-        minutes=seconds / 60.0,
-    )
+    engines = [each for result in results.values() for each in result["engines"].values()]
+    seconds = sum(each.get("s", 0.0) + each.get("fine_s", 0.0) for each in engines)
+    numbers = {"results": results, "engines": [*ENGINES], "minutes": seconds / 60.0}
+    text = rendered("verification.md", problems=PROBLEMS, **numbers)
     write_whole(HERE / "README.md", text)
 
 

@@ -107,16 +107,15 @@ def bricard(times: Array, case: Case) -> Array:
         angle = (b if i % 2 else a) - 0.5 * math.pi
         turn = turn * Rotation.from_rotvec(angle[:, np.newaxis] * AXES[i])
         points.append(points[-1] + turn.apply(POINTS[i + 1] - POINTS[i]))
-    path = CubicSpline(phase, np.stack(points, axis=1), bc_type="periodic")
+
+    def spline(values: Array) -> CubicSpline:
+        return CubicSpline(phase, values, bc_type="periodic")
+
+    path = spline(np.stack(points, axis=1))
     ways, places = path(phase, 1), path(phase)
     near, far = ways[:, :-1], ways[:, 1:]  # ends of rods, whose mass is m (a a + a b + b b) / 3
-    mass, level = (
-        CubicSpline(phase, values, bc_type="periodic")
-        for values in (
-            (near * near + near * far + far * far).sum(axis=(1, 2)) / 3.0,
-            0.5 * (places[:, :-1, 2] + places[:, 1:, 2]).sum(axis=1),
-        )
-    )
+    mass = spline((near * near + near * far + far * far).sum(axis=(1, 2)) / 3.0)
+    level = spline(0.5 * (places[:, :-1, 2] + places[:, 1:, 2]).sum(axis=1))
 
     def rate(_: float, y: Array) -> list[float]:
         return [y[1], (-0.5 * mass(y[0], 1) * y[1] ** 2 - G * level(y[0], 1)) / mass(y[0])]

@@ -1,4 +1,4 @@
-"""Structures: against an independent simulation, the row of tetrahedra, and what they sense.
+"""Structures: against an independent simulation, what they sense, and robots that nothing drives.
 
 In tests/data/structures.json sines pull at the cables of structures at rest, of which the first
 2.5 s are compared. After 5 s, starts 1e-7 m apart end 3e-7 m apart there, and half the step makes
@@ -121,6 +121,8 @@ def test_a_structure_walks_as_far_as_its_centre_of_mass():
     way = result.trajectory.p_WB[-1] - result.trajectory.p_WB[0]
     mass = Robot.of(heavy).structure.mass
     x, y, _ = mass @ way.values / mass.sum()
+    start, *_, end = result.path.centre
+    assert end - start == pytest.approx(mass @ way.values / mass.sum(), abs=1e-9)
     assert result.metrics.distance == pytest.approx(x, abs=1e-9)
     assert result.metrics.lateral_drift == pytest.approx(abs(y), abs=1e-9)
     assert abs(float(way.mean("body")[0]) - x) > 1e-4, "the mean of the bodies goes another way"

@@ -25,8 +25,7 @@ def test_a_trial_counts_up_to_its_own_stop():
 
 
 def test_trials_that_end_earlier_do_so_in_the_record():
-    record = readings.load_record(readings.RECORD)
-    ended = {name: [trial["iterations"] for trial in trials] for name, trials in record.items()}
+    ended = {name: each["iterations"].tolist() for name, each in readings.load_tables().items()}
     for name, reading in readings.ALL.items():
         if reading.trials_of:
             whole = ended[reading.trials_of]
