@@ -179,10 +179,8 @@ def test_the_scenarios_and_the_gait_of_the_pages_load(work: Path) -> None:
     (gait,) = snippets("json", text_of("scenario/signals"))
     (work / "gait.json").write_text(gait)
     small = td.load_scenario("feedback").with_changes({"robot.tetrahedra": 3})
-    assert td.load_gait("gait.json", small).parameters == {
-        "gain load": 0.0,
-        **json.loads(gait)["parameters"],
-    }
+    expected = {"gain load": 0.0} | json.loads(gait)["parameters"]
+    assert td.load_gait("gait.json", small).parameters == expected
 
 
 def test_the_springs_of_a_catalogue_are_as_the_page_says(work: Path) -> None:

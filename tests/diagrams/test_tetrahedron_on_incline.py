@@ -1,9 +1,8 @@
-"""A tetrahedron on an incline, and on level ground under directional friction, against mechanics.
+"""A tetrahedron that stays on an incline, and one that slips under directional friction.
 
-For the centre of mass, whatever the nodes' loads and however it rocks: friction that is mu times
-the normal force at every node gives m dv_t = -m g sin dt - mu dP along the slope and
-m dv_n = dP - m g cos dt across it, P the impulse of the normal forces. So v_t + mu v_n changes by
--g (sin + mu cos) t exactly, while all nodes slip uphill; downhill the sign of mu changes.
+For the centre of mass on level ground, whatever the nodes' loads and however it rocks: friction
+that is mu times the normal force at every node gives m dv_t = -mu dP and m dv_n = dP - m g dt, P
+the impulse of the normal forces. So v_t + mu v_n falls by mu g t exactly, while all nodes slip.
 """
 
 import math

@@ -142,5 +142,3 @@ def test_a_gait_file_with_a_wrong_body_is_refused(tmp_path, prism, run, refused)
         file.write_text(json.dumps(content | {"body": {key: value}}))
         with refused(file, f"body.{key}", ""):
             load_gait(file, prism)
-    with refused("ParameterSpace", "gait random gait 80", f"lacks the body's {SIDE}"):
-        ParameterSpace.of(prism).vector(seeded_gait(prism.with_changes({"evolve": {}})))

@@ -63,15 +63,12 @@ def foreign_run(tmp_path_factory):
     return folder / "run"
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "figures run --out out",
-        "replay run --out page.html",
-        "replay run/trial_00/best_gait.json --out page.html",
-        "evolve --resume --out run --workers 1",
-    ],
-)
+COMMANDS = ["figures run --out out", "replay run --out page.html"]
+COMMANDS += ["replay run/trial_00/best_gait.json --out page.html"]
+COMMANDS += ["evolve --resume --out run --workers 1"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_commands_name_the_code_of_a_run_before_they_import_it(
     command, foreign_run, tmp_path, monkeypatch, caplog
 ):

@@ -454,12 +454,8 @@ def test_stiffness_damping_and_friction_of_a_sliding_robot_are_within_their_inte
     """On a slope of 25 degrees the prism slides from the start, while its cables are pulled in
     turn: three feet touch all the time, so the motion is smooth in friction. The diagram plays
     reality; the engines differ by some micrometres here, the noise is 0.2 mm."""
-    settings = {
-        "engine": "!Compiled {tolerance: 0.01 mm/s}",
-        "terrain": "!Incline {slope: -25 deg}",
-        "friction.static": 0.26,
-        "friction.kinetic": 0.26,
-    }
+    settings = {"engine": "!Compiled {tolerance: 0.01 mm/s}", "friction.static": 0.26}
+    settings |= {"friction.kinetic": 0.26, "terrain": "!Incline {slope: -25 deg}"}
     scenario = shortly(load_scenario("prism"), 0.8, **settings)
     file, log = tmp_path / "command.csv", tmp_path / "log.csv"
     write_pulls(file, scenario, period=0.02, share=0.3, rate=6.0 * np.pi)

@@ -40,11 +40,10 @@ def test_what_is_no_entry_is_refused(tmp_path, text, key):
 
 def test_shares_are_of_the_best_interquartile_mean():
     values = {"good": [0.0, 2.0, 2.0, 100.0], "bad": [1.0, 1.0, 1.0, 1.0]}
-    records = [
-        {"task": "walk", "entry": entry, "seed": seed, "score": score}
-        for entry, scores in values.items()
-        for seed, score in enumerate(scores)
-    ]
+    records = []
+    for entry, scores in values.items():
+        row = {"task": "walk", "entry": entry}
+        records += [row | {"seed": seed, "score": score} for seed, score in enumerate(scores)]
     of_entries = bench.shares(records)
     assert of_entries["bad"]["walk"].tolist() == [0.5] * 4
     assert bench.overall(of_entries["good"])[0] == 1.0

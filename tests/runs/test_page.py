@@ -1,5 +1,10 @@
 """Pages are made from their records, by a renderer that misses no number."""
 
+import functools
+import shutil
+import tempfile
+from pathlib import Path
+
 import bench
 import damage
 import measured
@@ -17,41 +22,40 @@ from records import read
 from tetra_drake.files import read_json
 
 
-def planned(folder):
-    (folder / planning.RECORDS).symlink_to(planning.HERE / planning.RECORDS)
-    planning_page.write_page(folder, planning.all_episodes())
-    return (folder / "README.md").read_text("utf-8")
+def planned():
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copy(planning.HERE / planning.RECORDS, folder)
+        planning_page.write_page(Path(folder), planning.all_episodes())
+        return (Path(folder) / "README.md").read_text("utf-8")
 
 
 def of_oscillators():
     return oscillators.page(oscillators.numbers(read(oscillators.HERE / oscillators.RECORDS)))
 
 
+rows = functools.cache(measured.measured_rows)
+scores = functools.cache(lambda: read(bench.HERE / bench.RECORDS))
+DAMAGE = damage.WALKS, damage.PLANS, damage.CANDIDATES
+NUMBERS = measured.HERE / measured.NUMBERS, published.OUT / "numbers.json", thesis_page.NUMBERS
+OF_ROBOTS, OF_ENGINES, OF_THESIS = (read_json(file, "") for file in NUMBERS)
 PAGES = {
-    "bench/README.md": lambda _: bench.page(read(bench.HERE / bench.RECORDS)),
-    "bench/scores.csv": lambda _: bench.intervals(read(bench.HERE / bench.RECORDS)),
-    "damage/README.md": lambda _: damage.page(
-        *map(damage.read, (damage.WALKS, damage.PLANS, damage.CANDIDATES))
-    ),
-    "measured/intervals.csv": lambda _: measured.table(measured.measured_rows()["known"]),
-    "measured/README.md": lambda _: measured.page(
-        read_json(measured.HERE / measured.NUMBERS, ""), measured.measured_rows()
-    ),
-    "oscillators/README.md": lambda _: of_oscillators(),
-    "paper/paper.md": lambda _: paper.paper(),
+    "bench/README.md": lambda: bench.page(scores()),
+    "bench/scores.csv": lambda: bench.intervals(scores()),
+    "damage/README.md": lambda: damage.page(*map(damage.read, DAMAGE)),
+    "measured/intervals.csv": lambda: measured.table(rows()["known"]),
+    "measured/README.md": lambda: measured.page(OF_ROBOTS, rows()),
+    "oscillators/README.md": of_oscillators,
+    "paper/paper.md": paper.paper,
     "planning/README.md": planned,
-    "published/README.md": lambda _: page.rendered(
-        "published.md", starts=read_json(published.OUT / "numbers.json", "")
-    ),
-    "thesis/THESIS.md": lambda _: thesis_page.page(
-        recorded_run("thesis"), read_json(thesis_page.NUMBERS, "")
-    ),
+    "published/README.md": lambda: page.rendered("published.md", starts=OF_ENGINES),
+    "thesis/THESIS.md": lambda: thesis_page.page(recorded_run("thesis"), OF_THESIS),
 }
+"""What makes each page, by its place in runs/."""
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_page_shows_its_records(name, tmp_path):
-    assert PAGES[name](tmp_path) == (thesis_page.HERE / name).read_text("utf-8")
+def test_a_page_shows_its_records(name):
+    assert PAGES[name]() == (page.TEMPLATES.parent / name).read_text("utf-8")
 
 
 def test_a_number_that_is_not_given_is_refused(tmp_path, monkeypatch, refused):

@@ -35,10 +35,8 @@ def run_with(site: Path, folder: Path, program: str, *, jit: bool = False) -> di
     (folder / "use.py").write_text(program)
     paths = [str(site), str(Path(plugins.__file__).parents[2])]
     settings = {"PYTHONPATH": os.pathsep.join(paths), "NUMBA_DISABLE_JIT": str(int(not jit))}
-    command = [sys.executable, "use.py", "scenario.yaml"]
-    done = subprocess.run(
-        command, cwd=folder, env=os.environ | settings, capture_output=True, text=True
-    )
+    command, env = [sys.executable, "use.py", "scenario.yaml"], os.environ | settings
+    done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
     return json.loads(done.stdout.splitlines()[-1])
 
