@@ -11,7 +11,6 @@ import datetime
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pandas
 import tables
 from corpus import ENGINES
@@ -27,8 +26,6 @@ from tetra_drake.settings.units import INCH
 HERE = Path(__file__).parent
 CITATION = HERE.parent / "CITATION.cff"
 PAGE = HERE / "paper/paper.md"
-SIZES = (1, 4, 7, 13)
-"""Least numbers of bodies of the rows of the table by size."""
 
 
 def corpus_rows() -> pandas.DataFrame:
@@ -40,11 +37,6 @@ def corpus_rows() -> pandas.DataFrame:
         for known in rows["known"]
     ]
     return rows
-
-
-def by_size(rows: pandas.DataFrame) -> list[pandas.DataFrame]:
-    """Rows of the structures by number of bodies; SIZES are the least ones."""
-    return [each for _, each in rows.groupby(np.searchsorted(SIZES, rows["bodies"], side="right"))]
 
 
 def released(citation: Path = CITATION) -> datetime.date:
@@ -65,8 +57,6 @@ def paper() -> str:
         date=f"{released():%-d %B %Y}",
         runs=runs,
         corpus=rows,
-        by_size=by_size(rows),
-        sizes=SIZES,
         engines=ENGINES,
         differences=tables.differences(runs),
         far=tables.APART / INCH,

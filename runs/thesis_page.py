@@ -101,7 +101,7 @@ def weights_pattern(run: Run) -> dict[str, str]:
 
 
 def trials_numbers(run: Run) -> dict[str, Any]:
-    """Numbers of the thesis's chapter 3 from a run, as text; readings.py has the rest."""
+    """Numbers of the thesis's chapter 3 from a run; readings.py has the rest."""
     best, duration = run.best().set_index("trial"), run.scenario.simulation.duration
     trial, robot = int(best["fitness"].idxmax()), Robot.of(run.scenario)
     iterations = run.iterations.groupby("trial")["iteration"].max()
@@ -113,21 +113,16 @@ def trials_numbers(run: Run) -> dict[str, Any]:
     pairs = pandas.DataFrame({t: two_best(run, t) for t in best.index}).T
     return {
         "trial": trial,
-        "least_initial": fixed(run.initial()["distance_in"].min()),
+        "initial": run.initial(),
+        "best": best,
+        "pairs": pairs,
         "levelled": sum("levelled" in str(status.stop) for status in run.statuses),
         "seconds": rounded(seconds, 2),
         "faster": f"{round(2.0 * duration / seconds, -2):,.0f}",
-        "trial_seconds": over_trials(seconds * iterations, 0),
-        "hertz": over_trials(hertz),
-        "hertz_of_best": fixed(hertz[trial]),
+        "trial_seconds": seconds * iterations,
+        "hertz": hertz,
         "swing": fixed(np.ptp(signals[trial]) / POUND_FORCE),
-        "least_tension": fixed(best["tension"].min() / POUND_FORCE),
-        "signal_rate": over_trials(best["signal_rate"] / POUND_FORCE, 1),
         "twist": f"{best[['twist', 'lateral_drift']].to_numpy().max() / INCH:.0e}",
-        "same_tau": int((pairs["tau_A"] == 0.0).sum()),
-        "fitness_apart": over_trials(pairs["fitness"], 3),
-        "weights_apart": fixed(pairs.loc[trial].filter(like="weight ").max()),
-        "pair": dict(enumerate(pairs.loc[trial])),  # fitness, weights, time constants
         **weights_pattern(run),
     }
 
@@ -223,6 +218,7 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
         former=trials_numbers(load_run(FORMER)),
         tried=TRIED,
+        lbf=POUND_FORCE,
         sine=lambda name: fixed(sines[name]["distance_in"]),
         setting=setting,
         reached=reached,
