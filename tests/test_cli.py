@@ -17,28 +17,16 @@ from tetra_drake.robot.gait_file import save_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.scenario.load import load_scenario
 
-SHORT = """\
-base: thesis
-name: short
-simulation: {duration: 0.1 s, steady_from: 0.03 s, sample_period: 70 ms}
-"""
-"""The sample period does not divide the duration."""
-
-GOOD = seeded_gait(load_scenario()).to_json(load_scenario()) | {"name": "good"}
-FILES = {
-    "good.json": json.dumps(GOOD),
-    "short.yaml": SHORT,
-    "key.yaml": "base: thesis\nrobot: {tetrahedron: 4}\n",
-    "poor.yaml": SHORT.replace("{", "{max_evaluations: 100, "),
-}
+GIVEN = yaml.safe_load(Path(__file__).with_name("commands.yaml").read_text("utf-8"))
 
 
 @pytest.fixture
 def work(tmp_path, monkeypatch) -> Path:
     """The working folder, with good and bad files and an empty folder."""
     monkeypatch.chdir(tmp_path)
-    for name, text in FILES.items():
+    for name, text in GIVEN["files"].items():
         (tmp_path / name).write_text(text)
+    save_gait(seeded_gait(load_scenario()), "good.json", load_scenario())
     (tmp_path / "folder").mkdir()
     return tmp_path
 
@@ -55,10 +43,7 @@ def unchanged(work):
     assert contents() == before
 
 
-REFUSED = yaml.safe_load(Path(__file__).with_name("refused_commands.yaml").read_text("utf-8"))
-
-
-@pytest.mark.parametrize(("command", "source", "values"), REFUSED)
+@pytest.mark.parametrize(("command", "source", "values"), GIVEN["refused"])
 def test_wrong_options_and_files_are_refused_in_a_line(command, source, values, unchanged, capsys):
     try:
         status = main(command.split())

@@ -4,6 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from unittest.mock import MagicMock
 
+import numpy as np
 import pytest
 from helpers.analytic import Bowl, RandomSearch, in_threads, read_record, small_scenario
 from helpers.converged import shortly
@@ -37,7 +38,8 @@ def reports(monkeypatch):
 class Heaviest:
     """Another objective."""
 
-    factor: float = 1.0
+    factor: float
+    table: object
 
     def __call__(self, result):
         return self.factor * (1.0 + result.metrics.distance)
@@ -93,7 +95,8 @@ def scaled(factor):
     return objective
 
 
-METHODS = [(Heaviest(2.0), (None, Heaviest(3.0)), "Heaviest")]
+TABLE = np.ones(3)
+METHODS = [(Heaviest(2.0, TABLE), (None, Heaviest(3.0, TABLE)), "Heaviest")]
 METHODS += [(scaled(2.0), (scaled(3.0), scaled(-2.0)), "evaluation 0")]
 
 

@@ -11,10 +11,7 @@ from helpers.actuations import MOTOR
 from helpers.brief import BRIEF
 
 from tetra_drake.cli import main
-from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.run import load_run
 from tetra_drake.files import write_whole
-from tetra_drake.report.result_folder import load_result
 from tetra_drake.scenario.load import load_scenario
 
 FIELD = {"robot.contacts": "all", "terrain": "!HeightField {file: heights.txt, cell: 0.5 m}"}
@@ -64,11 +61,3 @@ def test_a_folder_is_read_or_refused(reader, writer, written, tmp_path, monkeypa
     assert status == 2 and not out.exists()
     (line,) = captured.err.splitlines()
     assert re.match(rf"tetra-drake: {writer}\b", line), line
-
-
-def test_what_is_written_simulates_to_the_same_digits(written):
-    result, run = load_result(written / "simulate"), load_run(written / "evolve")
-    walked = simulate(result.scenario, result.gait).metrics.distance
-    assert walked == result.metrics.distance
-    assert simulate(run, run).metrics.distance == run.fittest()["distance"]
-    assert run.reevaluations.empty, "by --no-reevaluate"

@@ -15,13 +15,9 @@ PROGRAM = Path(__file__).parent / "helpers" / "terminated_compiler.py"
 
 @pytest.mark.slow
 def test_a_sigterm_during_compilation_ends_a_command(tmp_path):
-    ended = subprocess.run(
-        [sys.executable, PROGRAM, tmp_path / "out"],
-        text=True,
-        capture_output=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-        timeout=40,
-    )
+    command, given = [sys.executable, PROGRAM, tmp_path / "out"], {"timeout": 40, "text": True}
+    given["env"] = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    ended = subprocess.run(command, capture_output=True, **given)
     assert (ended.returncode, ended.stdout) == (130, "compiled\n")
     assert ended.stderr == "\ntetra-drake: interrupted\n"
 

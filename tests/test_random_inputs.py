@@ -27,6 +27,7 @@ import pytest
 import yaml
 from helpers.brief import BRIEF
 from helpers.files import DATA
+from helpers.policies import Given
 from pydrake.common import RandomGenerator
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -43,13 +44,14 @@ from tetra_drake.laws.terrain import Grid, Relief
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
-from tetra_drake.scenario.policies import PolicyKind
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 INPUTS, SEED, LONGEST = int(os.environ.get("INPUTS", "600")), int(os.environ.get("SEED", "0")), 20.0
 PRISM = td.load_scenario("prism").with_changes(BRIEF | {"engine": "!Compiled"})
 TREE = yaml.safe_load((Path(td.__file__).parent / "scenario/structures/prism.yaml").read_text())
+GIVEN = yaml.safe_load(Path(__file__).with_name("random_inputs.yaml").read_text("utf-8"))
+SPREAD = {"disturbances": GIVEN["disturbances"]}
 PLAIN = [None, True, -1, 0, 2, 3.5, math.nan, math.inf, 1e300]
 PLAIN += ["", "x", "1 m", "-3 N", [], {}, [1, 2]]
 ODD = [*PLAIN, b"x", object(), np.zeros(3), np.full((6, 6), np.nan), {"a": 1}, [[math.nan] * 6]]
@@ -161,9 +163,7 @@ def commanded(rng, folder):
     text = yaml.safe_dump({"base": "prism", rng.choice([*PRISM.model_dump()]): rng.choice(PLAIN)})
     file = garbled(rng, folder, ".yaml", text)
     words = [file, "--out", folder / "x.html", "--units", "mm", "--scenario", "prism", "\x1b"]
-    command = rng.choice(
-        ["structure", "replay", "figures", "cpg", "schema", "compare", "robustness"]
-    )
+    command = rng.choice(GIVEN["commands"])
     try:
         status = main([command, *map(str, rng.sample(words, rng.randint(0, 4)))])
     except SystemExit as ended:  # of the parser
@@ -172,28 +172,10 @@ def commanded(rng, folder):
         raise InputError(command, "", "refused")
 
 
-SPIN = {"spin": [0, 0, "1 rad/s"], "turned": {"axis": [0, 1, 1]}}
-START = SPIN | {"velocity": ["1 m/s", 0, 0], "rest": True, "bodies": {"n0 n4": SPIN}}
-PUSH = {"at": "10 ms", "push": {"impulse": [0, 0, "1 mN*s"], "on": "n3"}}
-
-
 def begun(rng, folder):
-    start, push = mutated(rng, START), mutated(rng, PUSH)
+    start, push = mutated(rng, GIVEN["start"]), mutated(rng, GIVEN["push"])
     changes = rng.choice([{"robot.start": start}, {"events": [push]}])
     td.simulate(PRISM.with_changes(changes), td.seeded_gait(PRISM, 1))
-
-
-class Given(PolicyKind):
-    """A policy of a plug-in with answers that do not fit."""
-
-    answer: ClassVar[Any] = None
-    bounds: ClassVar[Any] = 0.0, 1.0
-
-    def parameters(self, blueprint):
-        return {"p": self.bounds}
-
-    def signals(self, robots, readings, values):
-        return self.answer
 
 
 class Surface(Relief):
@@ -206,10 +188,8 @@ class Surface(Relief):
 
 
 def plugged(rng, folder):
-    Given.answer, Given.bounds = (
-        rng.choice([*ODD, np.zeros((1, 6))]),
-        rng.choice([*ODD, (0.0, 1.0)]),
-    )
+    Given.answer = rng.choice([*ODD, np.zeros((1, 6))])
+    Given.bounds = rng.choice([*ODD, (0.0, 1.0)])
     odd_grid = odd(rng, heights=np.zeros((3, 3)), start=(-1.0, -1.0), cell=(1.0, 1.0))
     Surface.given = rng.choice([Grid(*odd_grid.values()), *ODD])
     section = rng.choice([{"policy": Given()}, {"terrain": Surface()}])
@@ -218,21 +198,9 @@ def plugged(rng, folder):
 
 
 def entered(rng, folder):
-    body = rng.choice(
-        [
-            "return answer",
-            "problem.evaluate(answer)",
-            "problem.spend(answer)",
-            "problem.left = 1e9",
-            "raise ValueError(answer)",
-            "raise SystemExit(answer)",
-            "return lambda now, readings: answer",
-        ]
-    )
-    text = f"def solve(problem, seed):\n    answer = {rng.choice(PLAIN)!r}\n    {body}\n"
-    text += rng.choice(
-        ["", f"TASKS = {rng.choice(PLAIN)!r}\n", f"CHANGES = {rng.choice(PLAIN)!r}\n"]
-    )
+    text = f"def solve(problem, seed):\n    answer = {rng.choice(PLAIN)!r}\n"
+    text += f"    {rng.choice(GIVEN['solvers'])}\n"
+    text += rng.choice(["", "TASKS = {!r}\n", "CHANGES = {!r}\n"]).format(rng.choice(PLAIN))
     (folder / "own.py").write_text("from math import inf, nan\n" + text)
     entry = bench.Entry.of(folder / "own.py")
     task = dataclasses.replace(bench.TASKS[0], changes={"simulation.duration": "2 s"})
@@ -254,44 +222,10 @@ def played(rng, folder):
     env.step(either(rng, env.action_space.sample()))
 
 
-NAMES = [
-    "<x/>",
-    "--",
-    "-->",
-    "]]>",
-    "&amp;",
-    '"',
-    "'",
-    "::",
-    "__x__",
-    "world",
-    " ",
-    "\n",
-    "\t",
-    "/",
-]
-NAMES += [
-    "\x1b[31m",
-    "\u202e",
-    "\x00",
-    "\ufffe",
-    "ä",
-    "𝔘",
-    "..",
-    "%s",
-    "{0}",
-    "null",
-    "x" * 300,
-    "7",
-]
-
-
 def named(rng, folder):
     """Drake and MuJoCo read what is written of a robot whose parts have odd names."""
-    old, new = (
-        rng.choice(["n0", "n4", "bar", "side"]),
-        "".join(rng.choices(NAMES, k=rng.choice([1, 2]))),
-    )
+    old = rng.choice(["n0", "n4", "bar", "side"])
+    new = "".join(rng.choices([*GIVEN["names"], "x" * 300], k=rng.choice([1, 2])))
     text = re.sub(
         rf"\b{old}\b", lambda _: json.dumps(new, ensure_ascii=False)[1:-1], json.dumps(TREE)
     )
@@ -304,22 +238,8 @@ def named(rng, folder):
     assert all(plant.HasFrameNamed(f"node {node}") for node in robot.structure.node_names)
 
 
-SPRINGS = yaml.safe_load(
-    """
-coil: {pairs: [[n0, n1]], stiffness: 60 N/m, damping: 1 N*s/m, free_length: 0.1 m,
-  initial_tension: 1 N, quadratic: 9 N/m^2, cubic: 1 N/m^3, max_stretch: 0.1 m,
-  factors: {damping: [2]}}
-table: {pairs: [[n1, n4, n2]], damping: 1 N*s/m, tension: 1 N, mu: 0.3, max_tension: 9 N,
-  curve: {stretch: [0.1 m, 0.2 m], force: [1 N, 2 N]}}
-string: {pairs: [[n2, n3, n0]], string: true, free_length: 0.3 m, mu: 0.1}
-"""
-)
-ERRORS = {name: {"lengths": "1 mm", "q_WB": "1 deg"} for name in ("noise", "bias", "resolution")}
-ERRORS |= {"delay": {"rates": "100 ms", "tensions": "0 s"}, "seed": 3}
-
-
 def sprung(rng, folder):
-    cables = TREE["cables"] | mutated(rng, SPRINGS)
+    cables = TREE["cables"] | mutated(rng, GIVEN["springs"])
     text = yaml.dump(TREE | {"cables": cables})
     (folder / "a.yaml").write_text(text, "utf-8")
     file = garbled(rng, folder, ".yaml", text) if rng.random() < 0.3 else folder / "a.yaml"
@@ -327,16 +247,12 @@ def sprung(rng, folder):
 
 
 def sensed(rng, folder):
-    scenario = PRISM.with_file({"sensing": mutated(rng, ERRORS)}, "a")
+    scenario = PRISM.with_file({"sensing": mutated(rng, GIVEN["errors"])}, "a")
     return td.Simulation(scenario, count=1).step(np.zeros((1, 6)))
 
 
-SPREAD = {"disturbances": {"draws": 2, "spreads": {"ground.stiffness": 0.1}}}
-WAVES = "gain: 2 N, frequency: [0.3 Hz, 1 Hz], coupling: [0, 5 1/s], start_up: 0 s, common: [lag]"
-
-
 def waving(rng, folder):
-    tree = mutated(rng, yaml.safe_load(f"{{{WAVES}, feedback: [length], lag: [-90 deg, 1 rad]}}"))
+    tree = mutated(rng, GIVEN["waves"])
     waves = PRISM.with_changes({"cpg": "!Phase " + yaml.safe_dump(tree, default_flow_style=True)})
     td.simulate(waves, td.seeded_gait(waves, 1))
 

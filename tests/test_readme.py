@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import re
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from record import EXPERIMENTS
+from helpers.brief import BRIEF
 
 import tetra_drake as td
 from tetra_drake.cli import main, make_parser
@@ -29,16 +30,6 @@ MANUAL = [page for folder in FOLDERS for page in sorted((CHECKOUT / folder).rglo
 def text_of(page: str) -> str:
     """A page of the package, by its place there, without .md."""
     return (CHECKOUT / "tetra_drake" / f"{page}.md").read_text(encoding="utf-8")
-
-
-QUICK = """\
-base: thesis
-name: quick
-simulation: {duration: 0.4 s, steady_from: 0.1 s}
-evolution: {trials: 1, evaluations: 6}
-optimizer: {population: 4, tournament: 2}
-"""
-"""Takes the place of the shipped scenario of this name."""
 
 
 def snippets(language: str, page: str = README) -> list[str]:
@@ -89,7 +80,7 @@ def test_the_files_of_other_kinds_are_read(work: Path) -> None:
 
 @pytest.mark.slow
 def test_the_commands_run(work: Path) -> None:
-    (work / "short.yaml").write_text(QUICK)
+    (work / "short.yaml").write_text(td.load_scenario("quick").with_changes(BRIEF).to_yaml())
     for arguments in commands(README):
         # Shorter simulations of the same kind; the rest is as it stands.
         short = ["--scenario", "short.yaml"] if arguments[0] in ("simulate", "evolve") else []
@@ -99,28 +90,39 @@ def test_the_commands_run(work: Path) -> None:
 
 
 @pytest.fixture
-def shortened(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All scenarios end after a second."""
+def change_all(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """change_all({"simulation.duration": "1 s"}) changes all scenarios that a snippet loads."""
     load = td.load_scenario
-    times = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
-    monkeypatch.setattr(td, "load_scenario", lambda n: load(n).with_changes(times), raising=False)
+
+    def change(changes: dict[str, Any]) -> None:
+        monkeypatch.setattr(
+            td, "load_scenario", lambda n: load(n).with_changes(changes), raising=False
+        )
+
+    return change
 
 
-def test_the_python_runs(work: Path, shortened: None, monkeypatch: pytest.MonkeyPatch) -> None:
+SECOND = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
+
+
+def ran(snippet: str) -> dict[str, Any]:
+    """The names of a snippet that has run."""
+    names = dict[str, Any]()
+    exec(compile(snippet, "a page", "exec"), names)
+    return names
+
+
+def test_the_python_runs(work: Path, change_all, monkeypatch: pytest.MonkeyPatch) -> None:
+    change_all(SECOND)
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
     page = (CHECKOUT / "diagrams/tasks.md").read_text(encoding="utf-8")
-    (snippet,) = snippets("python", page)
-    exec(compile(snippet, "tasks.md", "exec"), {})
+    ran(*snippets("python", page))
     assert len(td.load_run("runs/python").evaluations) == 60
 
 
-def test_a_search_builds_a_diagram_per_candidate(monkeypatch: pytest.MonkeyPatch) -> None:
-    load = td.load_scenario
-    brief = {"simulation.duration": "0.05 s", "optimizer.population": 5}
-    monkeypatch.setattr(td, "load_scenario", lambda n: load(n).with_changes(brief), raising=False)
-    (snippet,) = snippets("python")
-    names = dict[str, Any]()
-    exec(compile(snippet, "README.md", "exec"), names)
+def test_a_search_builds_a_diagram_per_candidate(change_all) -> None:
+    change_all({"simulation.duration": "0.05 s", "optimizer.population": 5})
+    names = ran(*snippets("python"))
     cpg = names["diagram"].GetSubsystemByName("cpg")
     assert isinstance(cpg, MatsuokaCpg)
     assert len(names["found"]) == 2 and np.isfinite([one.fitness for one in names["found"]]).all()
@@ -132,21 +134,19 @@ def test_the_front_page_is_short() -> None:
 
 
 @pytest.mark.parametrize(("library", "number"), [("optuna", 1), ("nevergrad", 2), ("scipy", 3)])
-def test_libraries_find_gaits(library: str, number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_libraries_find_gaits(library: str, number: int, change_all) -> None:
     pytest.importorskip(library)
-    short = td.load_scenario("coulomb").with_changes({"simulation.duration": "2.5 s"})
-    monkeypatch.setattr(td, "load_scenario", lambda name: short, raising=False)
-    texts, names = snippets("python", text_of("evolution/libraries")), dict[str, Any]()
-    exec(compile(texts[0] + texts[number], "libraries.md", "exec"), names)
+    change_all({"simulation.duration": "2.5 s"})
+    texts = snippets("python", text_of("evolution/libraries"))
+    names = ran(texts[0] + texts[number])
     gait, first = names["best"], td.seeded_gait(names["scenario"], 1)
     best, other = td.simulate_many(names["scenario"], [gait, first])
     assert best.fitness > other.fitness
 
 
-def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: None) -> None:
-    (snippet, _) = snippets("python", text_of("scenario/signals"))
-    names: dict[str, Any] = {}
-    exec(compile(snippet, "signals.md", "exec"), names)
+def test_the_steering_runs_as_a_function_and_by_the_port(change_all) -> None:
+    change_all(SECOND)
+    names = ran(snippets("python", text_of("scenario/signals"))[0])
     assert names["result"].duration == names["simulator"].get_context().get_time() == 1.0
     steering = names["diagram"].GetSubsystemByName("steering")
     context = steering.GetMyContextFromRoot(names["simulator"].get_context())
@@ -155,13 +155,9 @@ def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: 
     assert tonic[:4] == pytest.approx([0.9, 0.9, 0.1, 0.1], rel=1e-12)
 
 
-def test_winches_wind_a_structure(work: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    floats = {"robot.gravity": "0 m/s^2", "terrain": "!Nothing"}
-    floating = td.load_scenario("six_bar").with_changes(floats)
-    monkeypatch.setattr(td, "load_scenario", lambda name: floating, raising=False)
-    (_, snippet) = snippets("python", text_of("scenario/signals"))
-    names: dict[str, Any] = {}
-    exec(compile(snippet, "signals.md", "exec"), names)
+def test_winches_wind_a_structure(change_all) -> None:
+    change_all({"robot.gravity": "0 m/s^2", "terrain": "!Nothing"})
+    names = ran(snippets("python", text_of("scenario/signals"))[1])
     lengths = names["result"].trajectory.length
     assert np.abs(lengths[-1] - lengths[0]).max() > 0.01
 
@@ -183,10 +179,8 @@ def test_the_scenarios_and_the_gait_of_the_pages_load(work: Path) -> None:
     (gait,) = snippets("json", text_of("scenario/signals"))
     (work / "gait.json").write_text(gait)
     small = td.load_scenario("feedback").with_changes({"robot.tetrahedra": 3})
-    assert td.load_gait("gait.json", small).parameters == {
-        "gain load": 0.0,
-        **json.loads(gait)["parameters"],
-    }
+    expected = {"gain load": 0.0} | json.loads(gait)["parameters"]
+    assert td.load_gait("gait.json", small).parameters == expected
 
 
 def test_the_springs_of_a_catalogue_are_as_the_page_says(work: Path) -> None:
@@ -215,23 +209,9 @@ def test_the_roads_name_what_the_files_have() -> None:
             assert re.search(rf"\b{name}\b", source), f"{file}: {name}"
 
 
-RUNS = (
-    "runs",
-    *(f"runs/{name}" for name in EXPERIMENTS if (CHECKOUT / "runs" / name).is_dir()),
-    *("runs/bench", "runs/damage", "runs/measured", "runs/oscillators", "runs/planning"),
-    *("runs/published", "runs/verification"),
-)
-"""Runs of one's own may lie beside the recorded ones."""
 LINK = re.compile(r'(?:\]\(|src="|href=")([^)"]+)')
-PAGES = [
-    "README.md",
-    "CHANGELOG.md",
-    "runs/thesis/THESIS.md",
-    *(f"{run}/README.md" for run in RUNS),
-]
-PAGES += [
-    str(page.relative_to(CHECKOUT)) for page in MANUAL if LINK.search(page.read_text("utf-8"))
-]
+PAGES = [*CHECKOUT.glob("*.md"), *CHECKOUT.glob("runs/**/*.md"), *MANUAL]
+LINKED = [page for page in PAGES if LINK.search(page.read_text("utf-8"))]
 
 
 def anchors(page: Path) -> set[str]:
@@ -240,15 +220,12 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-") for text in headings}
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_links_lead_somewhere(page: str) -> None:
-    file = CHECKOUT / page
-    links = LINK.findall(file.read_text(encoding="utf-8"))
-    assert links
-    for link in links:
+@pytest.mark.parametrize("page", LINKED, ids=lambda page: str(page.relative_to(CHECKOUT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    for link in LINK.findall(page.read_text(encoding="utf-8")):
         if link.startswith("https://"):
             continue
         path, _, anchor = link.partition("#")
-        target = file.parent / path if path else file
+        target = page.parent / path if path else page
         assert target.exists(), link
         assert not anchor or anchor in anchors(target), link

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 
 MOST_BYTES = 64 * 2**20
 """Default limit for the size of a file that is read into memory."""
@@ -78,8 +78,7 @@ def writing(path: str | Path) -> Iterator[None]:
 def given_path(path: str | Path, source: str, what: str) -> Path:
     """Converts an argument to a Path. Raises InputError, naming function `source` and argument
     `what`, if it is neither a text nor a Path."""
-    if not isinstance(path, (str, Path)):
-        raise InputError(source, what, f"found {path!r:.60}, expected a path")
+    check_type(source, what, path, str, Path)
     return Path(path)
 
 

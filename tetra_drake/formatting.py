@@ -150,15 +150,7 @@ class TextTable:
 
     def html(self) -> str:
         """The table as HTML, as notebooks show it."""
-        aligned = ["left" if is_text else "right" for is_text in self._holds_texts]
-        lines = []
-        for tag, row in [("th", self.headings), *(("td", row) for row in self.rows)]:
-            cells = [
-                f'<{tag} style="text-align: {side}">{html.escape(cell)}</{tag}>'
-                for side, cell in zip(aligned, row, strict=True)
-            ]
-            lines.append(f"<tr>{''.join(cells)}</tr>")
-        return f"<table>{''.join(lines)}</table>"
+        return render("table.html.jinja", table=self)
 
     def markdown(self) -> str:
         """The table in Markdown, without a line feed at the end. Numbers stay on one line in a

@@ -29,7 +29,7 @@ from tetra_drake.systems.diagram import cables_of
 
 ROBOTS = ["thesis", "motors", "rough", "prism", "six_bar", "mast", "pair", "odd names"]
 NAMES = {
-    "n0": "x--><worldbody/><!--",
+    "n0": "x--><b/><!--",
     "n1": "a-",
     "n2": "floor",
     "n3": "\"'",

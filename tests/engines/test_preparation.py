@@ -7,6 +7,7 @@ import pytest
 from helpers.converged import shortly
 from numba.core import event
 
+from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.gym import TensegrityEnv
 from tetra_drake.lab.stepping.simulation import Simulation
@@ -57,3 +58,9 @@ def test_no_environment_and_no_other_engine_compiles_anything():
     level = {"friction.stiffness": "0 N/m", "terrain": Incline(slope=0.0)}
     scenario = shortly(load_scenario("motors"), 0.05, engine="!Mujoco", **level)
     assert simulate(scenario, seeded_gait(scenario)).metrics.distance_in != 0.0
+
+
+def test_a_scenario_whose_draws_cut_cables_later_is_prepared():
+    late = {"draws": 1, "cuts": {"at": "1 s"}}
+    scenario = load_scenario("prism").with_changes({"disturbances": late})
+    engine_of(scenario).prepare(scenario)

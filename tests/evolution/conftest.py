@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.analytic import tasks_of
 
+from tests.engines.conftest import engine as engine
 from tetra_drake.evolution import evaluators
 from tetra_drake.evolution.evaluators import LentExecutor, WorkerProcesses
 from tetra_drake.robot.parameter_space import ParameterSpace

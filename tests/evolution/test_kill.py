@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from helpers.analytic import DrawnBowl, drawn_scenario, read_record, record_run
 
 import tetra_drake as td
@@ -20,21 +21,8 @@ PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
 
 
 KILLS_OF_COMMANDS = int(os.environ.get("KILLS", "3"))
-BRIEF_RUN = """
-base: prism
-name: brief
-engine: ENGINE
-cpg: {start_up: 0 s}
-simulation: {duration: 0.1 s, steady_from: 0.05 s}
-evolution: {evaluations: 8}
-optimizer: {population: 4, tournament: 2}
-"""
-EVOLVE = """
-import sys, tetra_drake as td
-if __name__ == "__main__":
-    options = dict(overwrite=True, seed=int(sys.argv[1]))
-    td.evolve("a.yaml", sys.argv[2], workers=2, report=False, reevaluate=False, **options)
-"""
+GIVEN = yaml.safe_load(Path(__file__).with_name("killed.yaml").read_text("utf-8"))
+"""A scenario, and a program that evolves it."""
 
 
 def run_and_kill(directory, executor, *, after=None, sign=signal.SIGKILL, delay=0.0):
@@ -106,8 +94,8 @@ def worker_of(process):
 @pytest.mark.parametrize("kind", ["overwrite", "worker", "video"])
 def test_a_killed_command_can_be_given_again(kind, tmp_path):
     engine = "!Drake {accuracy: 1e-2}" if kind == "worker" else "!Compiled"
-    (tmp_path / "a.yaml").write_text(BRIEF_RUN.replace("ENGINE", engine))
-    (tmp_path / "evolve.py").write_text(EVOLVE)
+    (tmp_path / "a.yaml").write_text(GIVEN["scenario"].replace("ENGINE", engine))
+    (tmp_path / "evolve.py").write_text(GIVEN["program"])
     paths = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     given = {"cwd": tmp_path, "env": paths, "start_new_session": True, "stderr": subprocess.PIPE}
     again = [sys.executable, "evolve.py", "2", "run"]

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 from helpers.brief import BRIEF
 from helpers.synthetic_run import tiny_scenario, write_run
 
@@ -15,13 +16,7 @@ from tetra_drake.robot.gait_file import given_gait, save_gait
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.policy_kinds import imported_function
 
-WAVE = """
-import logging
-import numpy as np
-logging.getLogger("tetra_drake").warning("imported")
-def wave(readings, values, robots):
-    return robots.rest * (1.0 + 0.05 * values * np.sin(60.0 * readings.time)[:, np.newaxis])
-"""
+PROGRAMS = yaml.safe_load(Path(__file__).with_name("program.yaml").read_text("utf-8"))
 
 
 @pytest.fixture
@@ -59,7 +54,7 @@ def test_another_scenario_than_the_gaits_is_said_once_with_both_names(run, tmp_p
 def foreign_run(tmp_path_factory):
     """A run whose policy is in a module beside it."""
     folder = tmp_path_factory.mktemp("foreign")
-    (folder / "wave.py").write_text(WAVE)
+    (folder / "wave.py").write_text(PROGRAMS["policy"])
     policy = {"policy": "!Python {function: 'wave:wave', count: 1}"}
     scenario = td.load_scenario("prism").with_changes(BRIEF | policy)
     with pytest.MonkeyPatch.context() as patch:
@@ -68,15 +63,12 @@ def foreign_run(tmp_path_factory):
     return folder / "run"
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "figures run --out out",
-        "replay run --out page.html",
-        "replay run/trial_00/best_gait.json --out page.html",
-        "evolve --resume --out run --workers 1",
-    ],
-)
+COMMANDS = ["figures run --out out", "replay run --out page.html"]
+COMMANDS += ["replay run/trial_00/best_gait.json --out page.html"]
+COMMANDS += ["evolve --resume --out run --workers 1"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_commands_name_the_code_of_a_run_before_they_import_it(
     command, foreign_run, tmp_path, monkeypatch, caplog
 ):

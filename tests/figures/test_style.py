@@ -36,11 +36,3 @@ def test_a_name_is_no_formula_but_a_text_in_the_common_style_may_be():
     assert not named.texts[0].get_parse_math()
     with common_style():
         assert Figure().text(0.0, 0.0, "$x^2$").get_parse_math()
-
-
-def test_a_figure_is_drawn_on_a_figure_and_on_nothing_else(refused):
-    drawn = figure_function(lambda: page_of(height_in=1.0))
-    own = Figure()
-    assert drawn(figure=own.subfigures()) is None
-    with refused("<lambda>", "figure", "Axes"):
-        drawn(figure=own.subplots())

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from pydrake.common import RandomGenerator
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
@@ -28,7 +29,7 @@ from helpers.policies import Given
 from helpers.rod import LAW, rod_with_tendons
 from tetra_drake.engines.drake import MakeDisturbedSimulator
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
-from tetra_drake.figures.style import Look
+from tetra_drake.figures.style import Look, figure_function, page_of
 from tetra_drake.gym import TensegrityEnv, TensegrityVectorEnv
 from tetra_drake.lab.bridges.sdf import make_sdf
 from tetra_drake.lab.fit.fit import fit

@@ -1,6 +1,7 @@
 """The pages in a real browser, headless and without network."""
 
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -45,13 +46,7 @@ def page(browser, replay):
         yield loaded
 
 
-PROJECT = """points => {
-    viewer.render();
-    // Meshcat's scene has its y axis up, so World is turned in it.
-    const world = viewer.scene_tree.object.matrixWorld;
-    return points.map(point => new MeshCat.THREE.Vector3(...point)
-        .applyMatrix4(world).project(viewer.camera).toArray());
-}"""
+PROJECT = Path(__file__).with_name("project.js").read_text("utf-8")
 
 
 def extent(page, trajectory, time):

@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 import pytest
-from helpers import joined
 from helpers.anchored import TREES, scenario_of
 from helpers.meshcat_page import read_page
 
@@ -52,16 +51,6 @@ def test_two_bars_side_by_side_bounce_as_masses_on_springs():
     assert first[2:] == pytest.approx(-second[2:], abs=1e-3)
 
 
-def test_a_bead_vibrates_across_its_string_alone():
-    # With the tension T and two pieces of length L: sqrt(2 T / (m L)) across the string. Along it
-    # the string's length does not change.
-    study = study_equilibrium(Robot.of(scenario_of(joined.STRING)))
-    tension = joined.STIFFNESS * (2.0 * joined.REACH - 0.38)
-    across = math.sqrt(2.0 * tension / (joined.LIGHT * joined.REACH)) / (2.0 * math.pi)
-    assert study.frequencies == pytest.approx([across, across], rel=1e-6)
-    assert study.statics.self_stresses.shape == (1, 1)
-
-
 @pytest.mark.parametrize("long", [1.0, 150.0])
 def test_a_hung_load_swings_as_slowly_as_its_rope_is_long(long):
     rope = {"pairs": [["hook", "load"]], "stiffness": 1e8, "damping": 0.0, "tension": 10.0}
@@ -71,16 +60,6 @@ def test_a_hung_load_swings_as_slowly_as_its_rope_is_long(long):
     swing, bounce = math.sqrt(9.80665 / long), math.sqrt(1e8 / 10.0)
     expected = np.array([swing, swing, bounce]) / (2.0 * math.pi)
     np.testing.assert_allclose(study.frequencies, expected, rtol=1e-5)
-
-
-def test_pinned_bars_balance_as_a_rhombus():
-    # At a corner both bars push with P: 2 P cos = T along the long diagonal, 2 P sin along the
-    # other, whose ratio is that of the diagonals.
-    study = study_equilibrium(Robot.of(scenario_of(joined.RHOMBUS)))
-    (state,) = study.statics.self_stresses
-    assert state[0] / state[1] == pytest.approx(2.0 / 1.2, rel=1e-6)
-    tension = study.cables["tension"]
-    assert tension.iloc[0] / tension.iloc[1] == pytest.approx(2.0 / 1.2, rel=0.01)
 
 
 def test_one_rigid_body_without_cables_rests_and_is_shown(tmp_path):

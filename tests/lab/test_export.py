@@ -25,28 +25,23 @@ def short():
     return load_scenario("coulomb").with_changes(SHORT)
 
 
-def test_the_folder_loads_and_begins_where_the_robot_does(short, tmp_path):
-    folder = tmp_path / "lab"
-    export(short, seeded_gait(short), rate=50.0, out=folder)
+def test_the_folder_has_the_signals_of_the_gait_and_begins_where_the_robot_does(short, tmp_path):
+    folder, gait = tmp_path / "lab", seeded_gait(short)
+    export(short, gait, rate=100.0, out=folder)
     assert {p.name for p in folder.iterdir()} == {COMMAND, EXPECTED, LIMITS_FILE, SCENARIO, README}
-    assert load_command(folder / COMMAND, load_scenario(folder / SCENARIO)).period == 0.02
+    command = load_command(folder / COMMAND, load_scenario(folder / SCENARIO))
+    signals = simulate(scenario=short, gait=gait, record=True).trajectory.signal
+    of_cable = Robot.of(short).structure.cables["signal"][Robot.of(short).driven]
+    np.testing.assert_allclose(command.samples, signals.values[:, of_cable], atol=1e-6)
+    assert command.period == 0.01
+    assert not command.samples[:20].any() and command.samples[21:].any(), "start-up until 0.2 s"
+    limits = pandas.read_csv(folder / LIMITS_FILE)
+    assert limits[["limit_of_force_N", "time_at_a_limit_percent"]].isna().all(axis=None)
     expected = pandas.read_csv(folder / EXPECTED)
-    assert len(expected) == 3 * 50 + 1
+    assert len(expected) == 3 * 100 + 1
     # T1's base edge of 6 in lies along y.
     edge = expected["T1 bottom_left y_mm"] - expected["T1 bottom_right y_mm"]
     assert edge[0] == pytest.approx(6 * 25.4, abs=1e-5)
-
-
-def test_forces_are_the_signals_of_the_gait(short, tmp_path):
-    gait = seeded_gait(short)
-    export(short, gait, rate=100.0, out=tmp_path / "lab")
-    samples = load_command(tmp_path / "lab" / COMMAND, short).samples
-    signals = simulate(scenario=short, gait=gait, record=True).trajectory.signal
-    of_cable = Robot.of(short).structure.cables["signal"][Robot.of(short).driven]
-    np.testing.assert_allclose(samples, signals.values[:, of_cable], atol=1e-6)
-    assert not samples[:20].any() and samples[21:].any(), "start-up until 0.2 s"
-    limits = pandas.read_csv(tmp_path / "lab" / LIMITS_FILE)
-    assert limits[["limit_of_force_N", "time_at_a_limit_percent"]].isna().all(axis=None)
 
 
 def test_a_tension_motor_is_commanded_the_whole_law_of_the_cable(short, tmp_path):
@@ -65,12 +60,10 @@ def test_the_loads_are_those_of_the_metrics_and_of_what_is_wound(short, kind, tm
     export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
     result = simulate(scenario=driven, gait=seeded_gait(short), record=True)
     metrics, loads = result.metrics, pandas.read_csv(tmp_path / "lab" / LIMITS_FILE)
-    peaks = loads.max(numeric_only=True)
-    assert peaks["peak_force_N"] == pytest.approx(metrics.peak_actuator_force, rel=1e-5)
-    assert 1e-3 * peaks["peak_speed_mm_per_s"] == pytest.approx(
-        metrics.peak_actuator_speed, rel=1e-5
-    )
-    assert peaks["peak_power_W"] == pytest.approx(metrics.peak_actuator_power, rel=1e-5)
+    peaks = loads[["peak_force_N", "peak_speed_mm_per_s", "peak_power_W"]].max().tolist()
+    speed = 1e3 * metrics.peak_actuator_speed
+    expected = [metrics.peak_actuator_force, speed, metrics.peak_actuator_power]
+    assert peaks == pytest.approx(expected, rel=1e-5)
     assert loads["mean_power_W"].mean() == pytest.approx(metrics.mean_actuator_power, rel=0.05)
     if isinstance(kind, LimitedActuator):
         # Half the greatest force at half the greatest speed: 5 N times 0.25 m/s.

@@ -1,7 +1,6 @@
 """Small motions about rest against analysis, statics and the engines; LQR."""
 
 import copy
-import functools
 import math
 
 import numpy as np
@@ -15,33 +14,13 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from tetra_drake.errors import InputError
-from tetra_drake.lab.linearization.linearization import Linearization, linearize
+from tetra_drake.lab.linearization.linearization import linearize
 from tetra_drake.lab.stepping.simulation import Simulation
-from tetra_drake.lab.study.equilibrium import study_equilibrium
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.robot.readings import first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
-
-
-@functools.cache
-def undamped() -> Linearization:
-    """The prism without weight, damping and actuators."""
-    groups = "bottom", "top", "side"
-    still = {f"robot__cables__{group}__damping": "0 N*s/m" for group in groups}
-    return linearize(Robot.of(floating_prism(robot__actuated={}, **still)))
-
-
-def test_without_damping_the_oscillations_are_those_of_stiffness_and_mass():
-    linear = undamped()
-    modes, study = linear.modes(), study_equilibrium(linear.robot)
-    assert len(study.frequencies) == 9, "18 motions less 6 of the whole and 3 spins of the bars"
-    assert modes.frequencies == pytest.approx(study.frequencies, rel=1e-7)
-    assert modes.damping_ratios == pytest.approx(np.zeros(9), abs=1e-7)
-    alone = np.flatnonzero(np.diff(study.frequencies, prepend=0, append=1e3)[:-1] > 0.1)[-1]
-    overlap = abs(np.vdot(modes.shapes[alone], study.modes[alone]))
-    assert overlap == pytest.approx(np.linalg.norm(study.modes[alone]) ** 2, rel=1e-5)
 
 
 def test_a_weight_on_a_damped_cable_bounces_as_a_damped_oscillator():
@@ -53,6 +32,7 @@ def test_a_weight_on_a_damped_cable_bounces_as_a_damped_oscillator():
     damped = natural * math.sqrt(1.0 - ratio**2) / (2.0 * math.pi)
     assert modes.frequencies[bounces] == pytest.approx(damped, rel=1e-6)
     assert modes.damping_ratios[bounces] == pytest.approx(ratio, rel=1e-6)
+    assert abs(modes.shapes[bounces, 1, 2].real) == pytest.approx(1.0), "in phase, the farthest"
 
 
 # On the ground the loaded nodes stick, and touch it all the time.
@@ -213,23 +193,14 @@ def test_the_gain_of_a_mast_is_found_at_the_highest_cost():
     # With a high cost Q = q 1 the slowest motion has the rate -1 /s: x and x' cost the same.
     linear = linearize("mast")
     gain = linear.lqr(1e10 * np.eye(48), np.eye(12))
-    assert np.linalg.eigvals(linear.system.A() - linear.system.B() @ gain).real.max() == (
-        pytest.approx(-1.0, abs=0.01)
-    )
-
-
-def test_gains_grow_as_the_root_of_a_high_cost():
-    gains = [prism().lqr(cost * np.eye(36), np.eye(6)) for cost in (1e8, 1e10)]
-    assert gains[1] == pytest.approx(10.0 * gains[0], abs=0.02 * np.abs(gains[1]).max())
-    A, B, kept = prism().system.A(), prism().system.B(), prism().resisted
-    assert kept.shape == (36, 30), "three spins of bars are left out"
-    assert np.linalg.eigvals(kept.T @ (A - B @ gains[1]) @ kept).real.max() < -0.9
+    roots = np.linalg.eigvals(linear.system.A() - linear.system.B() @ gain)
+    assert roots.real.max() == pytest.approx(-1.0, abs=0.01)
 
 
 def test_bristles_hold_the_nodes_that_stick_and_none_in_the_air():
     # Three nodes bear the prism, each with a bristle of 300 N/m. All bodies move along x.
     for modes, stiffness in ((None, 900.0), (np.zeros((6, MODE_COLUMNS)), 0.0)):
-        linear = linearize(PRISM, Robot.of(load_scenario(PRISM)).equilibrium.state, modes=modes)
+        linear = linearize("prism", Robot.of(load_scenario("prism")).equilibrium.state, modes=modes)
         along = [name.endswith(" x") for name in linear.states]
         pushed = [name.endswith(" v_x") for name in linear.states]
         acceleration = (linear.system.A() @ np.array(along, dtype=float))[pushed]
@@ -245,14 +216,6 @@ def test_the_turn_of_a_spinning_body_from_another_is_carried_along():
     turning, turn = linearize(robot, state).system.A()[:3, :3], np.array([0.1, 0.2, 0.3])
     expected = Rotation.from_rotvec(2.0 * w).apply(turn)
     assert expm(2.0 * turning) @ turn == pytest.approx(expected, abs=1e-8)
-
-
-PRISM = "prism"
-
-
-@functools.cache
-def prism() -> Linearization:
-    return linearize(PRISM)
 
 
 def test_a_robot_without_actuators_has_no_inputs():

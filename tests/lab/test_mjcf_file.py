@@ -104,9 +104,8 @@ def test_a_robot_is_the_same_after_a_way_to_mujoco_and_back(name: str, tmp_path:
     again = Robot.of(robot.scenario.with_sections(robot=structure), at_rest=name not in OWN)
     ours, theirs = robot.structure, again.structure
     order = [theirs.node_names.index(node.replace(" ", "_")) for node in ours.node_names]
-    v_WN, found = (
-        moved_nodes(each, each.initial_state)[:, V_WN : V_WN + 3] for each in (ours, theirs)
-    )
+    moved = (moved_nodes(each, each.initial_state) for each in (ours, theirs))
+    v_WN, found = (nodes[:, V_WN : V_WN + 3] for nodes in moved)
     assert found[order] == approx(v_WN, abs=1e-5)
     assert (np.ptp(v_WN) > 0.5) == (name == "in motion")
     back = model_of(again)

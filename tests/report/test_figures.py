@@ -37,15 +37,13 @@ def test_a_simulation_gets_the_figures_of_one_gait(folder):
     assert figures_in(folder / "figures") == OF_ONE_GAIT
 
 
-UNFINISHED = [([[[(1.0, 0)]], [], [[(None, 0)]]], {"initial_distances"})]
-UNFINISHED += [
-    ([[[(None, 0)], [(1.0, 0), (None, None)]]], {"initial_fitness", "initial_distances"})
-]
+UNFINISHED = [([[[(1.0, 0)]], [], [[(None, 0)]]], {"initial_distances"})]  # at work
+# No initial gait has a fitness.
+FAILED = {"initial_fitness", "initial_distances"}
+UNFINISHED += [([[[(None, 0)], [(1.0, 0), (None, None)]]], FAILED)]
 
 
-@pytest.mark.parametrize(
-    ("trials", "missing"), UNFINISHED, ids=["at work", "no initial gait has a fitness"]
-)
+@pytest.mark.parametrize(("trials", "missing"), UNFINISHED)
 def test_an_unfinished_run_is_drawn_as_far_as_it_has_come(tmp_path, trials, missing):
     run = write_run(tmp_path / "run", trials, unfinished=range(len(trials)))
     (run / "trial_00" / "in_progress.jsonl").write_text('{"index": 1, "torn')

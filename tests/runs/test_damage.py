@@ -33,8 +33,3 @@ def test_trials_turn_to_the_side_of_the_map_that_still_walks_and_end():
     while (following := damage.next_trial(places, before, tried, after[tried])) is not None:
         tried.append(following)
     assert len(tried) < damage.SET["trials"] and after[tried].max() > 0.9 * after.max()
-
-
-def test_the_page_is_made_from_the_records():
-    records = map(damage.read, (damage.WALKS, damage.PLANS, damage.CANDIDATES))
-    assert damage.page(*records) == (damage.HERE / "README.md").read_text("utf-8")

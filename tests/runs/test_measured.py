@@ -2,7 +2,6 @@
 
 import functools
 import hashlib
-import json
 
 import measured
 import measured_intervals
@@ -78,13 +77,6 @@ def test_the_blind_predictions_are_as_they_were_committed():
     table = pandas.read_csv(measured.HERE / "blind.csv")
     assert (table["low"] < table["median"]).all() and (table["median"] < table["high"]).all()
     assert table["structure"].nunique() == 7 and table["assumed"].notna().all()
-
-
-def test_the_page_shows_its_records():
-    numbers = json.loads((measured.HERE / measured.NUMBERS).read_text(encoding="utf-8"))
-    rows = measured.measured_rows()
-    assert measured.page(numbers, rows) == PAGE
-    assert measured.table(rows["known"]) == (measured.HERE / measured.INTERVALS).read_text()
 
 
 def test_blind_forces_hold_and_blind_heights_do_not_until_the_supports_stay_in_place():

@@ -6,11 +6,6 @@ from records import read
 RECORDS = read(oscillators.HERE / oscillators.RECORDS)
 
 
-def test_the_page_shows_its_records():
-    page = (oscillators.HERE / "README.md").read_text(encoding="utf-8")
-    assert oscillators.page(oscillators.numbers(RECORDS)) == page
-
-
 def test_phase_oscillators_that_evolve_on_steps_pass_the_farthest_sine_there():
     trials = oscillators.numbers(RECORDS)["steps"]["trials"]
     assert trials.min() > oscillators.load_sines()["steps"]["distance_in"]

@@ -9,10 +9,6 @@ TEXT = paper.PAGE.read_text(encoding="utf-8")
 ENTRIES = (paper.PAGE.parent / "paper.bib").read_text(encoding="utf-8")
 
 
-def test_the_paper_is_as_its_records_say():
-    assert paper.paper() == TEXT
-
-
 def test_what_is_cited_is_in_the_bibliography_and_nothing_else():
     cited = set(re.findall(r"(?<![\w.])@([a-z]+\d*)", TEXT))
     assert cited == set(re.findall(r"^@\w+\{(\w+),$", ENTRIES, re.M))

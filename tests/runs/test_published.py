@@ -2,16 +2,10 @@
 
 import numpy as np
 import published
-from page import rendered
 
 from tetra_drake.files import read_json
 
 NUMBERS = read_json(published.OUT / "numbers.json", "numbers")
-
-
-def test_the_page_shows_its_numbers():
-    page = (published.OUT / "README.md").read_text(encoding="utf-8")
-    assert rendered("published.md", starts=NUMBERS) == page
 
 
 def test_engines_are_nearer_to_each_other_than_to_mujoco_and_springs_that_push_differ_most():

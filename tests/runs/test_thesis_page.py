@@ -3,16 +3,8 @@
 import re
 
 import thesis_page
-from helpers.recorded import recorded_run
-
-from tetra_drake.files import read_json
 
 TEXT = thesis_page.PAGE.read_text(encoding="utf-8")
-SIMULATED = read_json(thesis_page.NUMBERS, "")
-
-
-def test_the_page_is_current() -> None:
-    assert thesis_page.page(recorded_run("thesis"), SIMULATED) == TEXT
 
 
 def test_the_page_leaves_nothing_of_the_thesis_out() -> None:

@@ -74,9 +74,8 @@ def test_a_body_may_need_no_strut_or_no_cable() -> None:
     rope = "{rope: {pairs: [[a, b]], stiffness: 1 kN/m, damping: 0, free_length: 1 m}}"
     for more, names in ((f"anchors: {{a: xyz}}\ncables: {rope}", ("rope a b",)), ("", ())):
         own = text if more else text.replace("[b]", "[b, a]")
-        blueprint = StructureFile.from_tree(
-            parse_yaml(own + more, "my.yaml"), "my.yaml"
-        ).blueprint()
+        tree = parse_yaml(own + more, "my.yaml")
+        blueprint = StructureFile.from_tree(tree, "my.yaml").blueprint()
         assert (blueprint.bodies, blueprint.cable_names) == (("ball",), names)
 
 

@@ -56,10 +56,3 @@ def test_a_unit_is_that_of_bare_coordinates() -> None:
     in_m, in_dm = read_structure("prism"), read_structure("prism", unit="dm")
     for node, place in in_m.nodes.items():
         assert in_dm.nodes[node] == approx([0.1 * x for x in place])
-
-
-def test_memory_limits_count_bodies(folder: Path, refused) -> None:
-    more = "simulation: {sample_period: 2e-5 s}"
-    assert load(folder, "{tetrahedra: 2}", more=more)
-    with refused(folder / "mine.yaml", "simulation.sample_period", "2.25e-05"):
-        load(folder, "!Structure {file: own.yaml}", more=more)

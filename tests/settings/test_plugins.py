@@ -35,10 +35,8 @@ def run_with(site: Path, folder: Path, program: str, *, jit: bool = False) -> di
     (folder / "use.py").write_text(program)
     paths = [str(site), str(Path(plugins.__file__).parents[2])]
     settings = {"PYTHONPATH": os.pathsep.join(paths), "NUMBA_DISABLE_JIT": str(int(not jit))}
-    command = [sys.executable, "use.py", "scenario.yaml"]
-    done = subprocess.run(
-        command, cwd=folder, env=os.environ | settings, capture_output=True, text=True
-    )
+    command, env = [sys.executable, "use.py", "scenario.yaml"], os.environ | settings
+    done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
     return json.loads(done.stdout.splitlines()[-1])
 
@@ -91,15 +89,6 @@ def build() -> type[Section]:
 
 
 KIND = "from tetra_drake.laws.friction import Coulomb\nclass {}(Coulomb): pass\n"
-
-
-def test_a_kind_of_a_plugin_is_one_of_the_union(site):
-    (site / "sticky.py").write_text(KIND.format("Sticky"))
-    declare(site, "sticky", "2.0", {plugins.KINDS: {"Sticky": "sticky:Sticky"}})
-    friction = build().from_tree({"friction": {TAG: "Sticky", "static": 0.7}}, "mine").friction
-    assert (friction.tag, friction.static) == ("Sticky", 0.7)
-    assert plugins.plugins_of([("friction", friction)]) == {"plug-in sticky": "2.0"}
-    assert plugins.plugins_of([("friction", Coulomb())]) == {}
 
 
 DAMAGED = yaml.safe_load(Path(__file__).with_name("damaged.yaml").read_text("utf-8"))

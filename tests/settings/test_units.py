@@ -49,14 +49,7 @@ def test_anything_else_is_refused_with_what_was_found(text, unit, words):
     assert all(word in problem for word in words)
 
 
-SMALL = {"robot.strut_length": "15 cm", "robot.strut_diameter": "3 mm"}
-LARGE = {"robot.strut_length": "2 m", "robot.strut_diameter": "1 dm", "robot.node_diameter": "2 dm"}
-OF_ROBOTS = [("thesis", {}, "in"), ("thesis", SMALL, "cm"), ("thesis", LARGE, "SI")]
-OF_ROBOTS += [("prism", {}, "cm")]  # a radius of 0.1 m, a height of 0.16 m
-OF_ROBOTS += [("prism", {"robot.unit": "mm"}, "mm")]  # given in mm
-
-
-@pytest.mark.parametrize(("base", "changes", "expected"), OF_ROBOTS)
+@pytest.mark.parametrize(("base", "changes", "expected"), ROWS["robots"])
 def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, tmp_path):
     scenario = load_scenario(base).with_changes(changes)
     (tmp_path / "record.yaml").write_text(dump_scenario(scenario))  # in SI

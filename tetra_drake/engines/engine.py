@@ -51,10 +51,9 @@ class Engine:
     def prepare(self, scenario: Scenario) -> None:
         """Compiles the kernels that the scenario's simulations need, by a very short simulation."""
         brief = max(_BRIEF, scenario.cpg.listing_step)
-        if brief < scenario.simulation.duration:
-            times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}
-            changes = {f"simulation.{key}": f"{time!r} s" for key, time in times.items()}
-            scenario = scenario.with_sections(events=[]).with_changes(changes)
+        times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}
+        changes = {f"simulation.{key}": f"{time!r} s" for key, time in times.items()}
+        scenario = scenario.undisturbed().with_changes(changes)
         with contextlib.suppress(SimulationFailure):  # recording needs kernels, too
             self.simulate(driven_robot(scenario, seeded_gait(scenario)), record=True)
 

@@ -51,7 +51,7 @@ from tetra_drake.robot.equilibrium import (
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Phase, Robot
-from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.robot.signals import DrivenRobot, interpolated
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.robot.structure import rotated, turned_back
 from tetra_drake.scenario.engine_kinds import Mujoco
@@ -279,8 +279,7 @@ class _MujocoRobot:
         if not self._driven.pilot:
             return self._driven.signals_at(times)
         bends, signals = zip(*self._bends, strict=True)
-        rows = [np.interp(times, bends, each) for each in np.transpose(signals)]
-        return np.reshape(rows, (len(signals[0]), len(times))).T
+        return interpolated(times, bends, signals)
 
     def _stepped(self, rollout: Any, signals: Array) -> tuple[Array, Array]:
         """Simulates one step for each row of signals (steps, m) in N, from the present state.

@@ -20,7 +20,7 @@ from tetra_drake.robot.command import (
     driven_robot,
     robot_of_controller,
 )
-from tetra_drake.robot.gait import Gait, SteeringSignal, constant_steering
+from tetra_drake.robot.gait import Gait, SteeringSignal
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -40,7 +40,7 @@ def simulate(
     control_period: float | None = None,
     record: bool = False,
     viewer: Viewer | None = None,
-    steering: SteeringSignal | float | None = None,
+    steering: SteeringSignal | None = None,
 ) -> SimulationResult:
     """Simulates a robot that follows a gait, a command for its actuators, or a controller.
 
@@ -73,8 +73,6 @@ def simulate(
     own_gait = _best_gait_of(scenario)
     scenario = given_scenario(scenario)
     check_type("simulate", "record", record, bool)
-    if steering is not None and not callable(steering):
-        steering = constant_steering(steering)
     if viewer is not None:
         check_can_be_watched(scenario)
     if controller is not None:

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
+from types import NoneType
 from typing import Any, TypeAlias
 
 import matplotlib.style
@@ -30,7 +31,7 @@ from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 from matplotlib.ticker import MaxNLocator
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.files import whole_file
 from tetra_drake.robot.measures import Span
 from tetra_drake.settings.units import shown_in
@@ -165,10 +166,7 @@ def figure_function(draw: Callable[..., Drawn]) -> Callable[..., Drawn]:
 
     @functools.wraps(draw)
     def make(*args: Any, figure: Page | None = None, units: str | None = None, **own: Any) -> Drawn:
-        if not isinstance(figure, Page | None):
-            kind = type(figure).__name__
-            problem = f"found a value of type {kind}, expected matplotlib's Figure or SubFigure"
-            raise InputError(draw.__name__, "figure", problem)
+        check_type(draw.__name__, "figure", figure, Figure, SubFigure, NoneType)
         look = Look(**{name: own.pop(name) for name in vars(Look()) if name in own})
         token = GIVEN.set(figure)
         try:

@@ -75,17 +75,7 @@ def write_page(
     Raises:
         InputError: if a file cannot be written.
     """
-    paragraphs = [
-        f"# {title}",
-        about,
-        table.markdown(),
-        "\n".join(f"- {note}" for note in notes),
-        unknown,
-        f"![{caption}]({figure}.svg)",
-        second.markdown(),
-        f"[{SCENARIO}]({SCENARIO}) {content}.\n",
-    ]
-    write_whole(folder / README, "\n\n".join(filter(None, paragraphs)))
     shown = {"title": title, "about": about, "table": table, "notes": notes, "unknown": unknown}
     shown |= {"figure": figure, "caption": caption, "second": second, "content": content}
-    write_whole(folder / name, render("lab/page.html.jinja", **shown, scenario=SCENARIO))
+    for file, template in ((name, "page.html"), (README, "page.md")):
+        write_whole(folder / file, render(f"lab/{template}.jinja", **shown, scenario=SCENARIO))

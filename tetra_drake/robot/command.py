@@ -70,8 +70,8 @@ def driven_robot(
     """The robot of a scenario, driven by a gait, a command, or the scenario's policy.
 
     The signals of a command are linear between multiples of `cpg.listing_step` (s). A change of
-    setpoint begins at the time of its sample and takes one such step. `steering`, a function from
-    time (s) to the turn (-1 to 1), replaces the constant turn of a gait; a command ignores it.
+    setpoint begins at the time of its sample and takes one such step. `steering`, a turn
+    (-1 to 1) or a function from time (s) to it, replaces the turn of a gait; a command ignores it.
     `robot` is the scenario's robot if it is made already.
 
     Raises InputError for a command without samples, or whose number of cables is not the robot's
@@ -86,7 +86,7 @@ def driven_robot(
         if scenario.policy is None:
             return DrivenRobot.of(robot, driver, steering=steering)
         if steering is not None:
-            raise InputError("steering", "", f"found a function, and {driver.name} is for a policy")
+            raise InputError("steering", "", f"found some, and {driver.name} is for a policy")
         own = scenario.policy.gait_parameters(robot.structure)
         given = check_parameters(driver.parameters, own, f"gait {driver.name}", "parameters")
         values, step = np.array([*given.values()], dtype=float), scenario.cpg.listing_step

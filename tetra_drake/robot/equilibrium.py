@@ -317,11 +317,6 @@ class Envelope(NamedTuple):
         return cls(order, np.repeat(6 * np.maximum.accumulate(last) + 6, 6))
 
     @property
-    def widest(self) -> int:
-        """Length of the longest row, from its diagonal on."""
-        return int((self.ends - np.arange(self.ends.size)).max())
-
-    @property
     def work(self) -> float:
         """Work of a factorisation, as for a full matrix whose size cubed is this number."""
         return 3.0 * float(((self.ends - np.arange(self.ends.size)) ** 2).sum())
@@ -339,7 +334,8 @@ class Factor(NamedTuple):
         """The factor of a matrix (6*n, 6*n) with 6 x 6 blocks and `shift` added to its diagonal.
         None if a pivot is at most `least`."""
         envelope = Envelope.of(matrix)
-        factor = np.zeros((envelope.ends.size, envelope.widest))
+        lengths = envelope.ends - np.arange(envelope.ends.size)
+        factor = np.zeros((lengths.size, lengths.max()))
         position = np.argsort(envelope.order)
         put_blocks(matrix.indptr, matrix.indices, matrix.data, position, factor)
         factor[:, 0] += shift

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tetra_drake.errors import InputError, check_type
+from tetra_drake.errors import InputError
 from tetra_drake.laws.oscillator import GaitParameter
 from tetra_drake.scenario.world import World
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 Body = tuple[tuple[str, float | str], ...]
 """Numbers of a robot: scenario keys, and values as texts with units, or as numbers without one."""
 
-SteeringSignal = Callable[[float], float]
-"""Function from time (s) to the turn, -1 to 1."""
+SteeringSignal = float | Callable[[float], float]
+"""Turn, -1 to 1, or function from time (s) to the turn."""
 
 _MOST = 15
 """Largest number of parameters that are printed."""
@@ -106,14 +106,6 @@ def check_parameters(
         found = f"found {len(given)}, expected the {len(expected)} of the scenario"
         raise InputError(source, key, f"{found}; {' and '.join(texts)}")
     return values
-
-
-def constant_steering(turn: float) -> SteeringSignal:
-    """Steering function that gives the same turn, -1 to 1, at all times; a positive turn raises the
-    input of left oscillators. Raises InputError unless the turn is a number; checked_turn() checks
-    its limits later."""
-    check_type("steering", "", turn, numbers.Real, Callable)
-    return lambda time: turn
 
 
 def checked_turn(turn: float, *, time: float) -> float:

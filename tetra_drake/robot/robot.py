@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import numbers
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import NoneType
@@ -268,21 +269,21 @@ class Robot:
     def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
         """Turns, -1 to 1: how much more input left oscillators have than right ones.
 
-        They are the values of `steering`, a function of time (s), at multiples of
-        `cpg.listing_step` from t = 0 to the end. Without `steering` there is one value, the gait's
-        constant turn. At 1 only the left oscillators have input, at -1 only the right ones. Raises
-        InputError if a value is not between -1 and 1, or if no oscillator is on one side of the
-        robot.
+        They are the values of `steering` at multiples of `cpg.listing_step` from t = 0 to the end.
+        If it is a number there is one value, and without it one, the gait's turn. At 1 only the
+        left oscillators have input, at -1 only the right ones. Raises InputError if a value is not
+        between -1 and 1, or if no oscillator is on one side of the robot.
         """
-        check_type("steering", "", steering, Callable, NoneType)
-        if (steering or gait.turn) and not self.structure.sides.any():
-            source = "steering" if steering else f"gait {gait.name}"
+        check_type("steering", "", steering, numbers.Real, Callable, NoneType)
+        turn = gait.turn if steering is None else steering
+        if turn and not self.structure.sides.any():
+            source = f"gait {gait.name}" if steering is None else "steering"
             raise InputError(source, "", "turns, but no oscillator is on one side of the robot")
-        if steering is None:
-            return np.array([gait.turn])
+        if not callable(turn):
+            return np.array([checked_turn(turn, time=0.0)])
         step = self.scenario.cpg.listing_step
         times = step * np.arange(round(self.scenario.simulation.duration / step) + 1)
-        return np.array([checked_turn(steering(time), time=time) for time in times.tolist()])
+        return np.array([checked_turn(turn(time), time=time) for time in times.tolist()])
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
         """Tonic input of both inputs of m oscillators (..., 2m), for turns (...) from -1 to 1. It

@@ -83,14 +83,14 @@ class DrivenRobot:
     gait: Gait | None = None
     """The gait whose oscillators or policy make the signals; None if they are given."""
     steering: SteeringSignal | None = None
-    """Function from time to the turn, -1 to 1, in place of the gait's turn; None for the gait's."""
+    """Turn, or function from time to the turn, in place of the gait's turn; None for the gait's."""
     pilot: Pilot | None = None
     """The policy or controller that sets the signals while the robot moves; None without one."""
 
     @classmethod
     def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
-        """A robot driven by the oscillators of a gait. `steering`, a function from time (s) to the
-        turn (-1 to 1), replaces the gait's constant turn. For a policy see
+        """A robot driven by the oscillators of a gait. `steering`, a turn (-1 to 1) or a function
+        from time (s) to it, replaces the gait's turn. For a policy see
         robot.command.driven_robot()."""
         none = np.zeros((0, robot.structure.signals))
         return cls(robot=robot, name=gait.name, samples=none, gait=gait, steering=steering)
@@ -134,9 +134,7 @@ class DrivenRobot:
         feedback."""
         samples = self._all_samples
         grid = self.robot.scenario.cpg.listing_step * np.arange(len(samples))
-        values = np.empty((len(times), samples.shape[1]))
-        for column, given in enumerate(samples.T):
-            values[:, column] = np.interp(times, grid, given)
+        values = interpolated(times, grid, samples)
         values[times < self.start_up - 1e-9] = 0.0
         return values
 
@@ -172,6 +170,15 @@ class DrivenRobot:
         without a gait."""
         gait = self.oscillating
         return self.robot.turns(gait, self.steering) if gait else np.zeros(1)
+
+
+def interpolated(times: np.ndarray, given: Any, signals: Any) -> np.ndarray:
+    """Signals (times, m) at `times` (s), linear between the `signals` (k, m) at the `given` times
+    (k,), and held at the end."""
+    values = np.empty((np.size(times), np.shape(signals)[1]))
+    for column, each in enumerate(np.transpose(signals)):
+        values[:, column] = np.interp(times, given, each)
+    return values
 
 
 def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:

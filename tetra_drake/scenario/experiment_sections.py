@@ -11,16 +11,13 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, WithJsonSchema
 
-from tetra_drake.settings.quantities import Keyed, Time, different_keys
+from tetra_drake.settings.quantities import TWO, Keyed, Time, different_keys
 from tetra_drake.settings.section import Section
 
 BodyBound = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})]
 """A bound of a number in SI, or a text with a unit. Its key decides which units are possible."""
 
-BodyBounds = Annotated[
-    Keyed[str, Annotated[list[BodyBound], Field(min_length=2, max_length=2)]],
-    AfterValidator(different_keys),
-]
+BodyBounds = Annotated[Keyed[str, Annotated[list[BodyBound], TWO]], AfterValidator(different_keys)]
 """Least and greatest value of numbers of the robot, by scenario key or by joined keys."""
 
 BODY_SECTIONS = ("robot", "actuation", "cpg", "friction", "ground", "strut_contact")

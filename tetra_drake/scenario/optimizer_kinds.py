@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.settings.plugins import OPTIMIZERS
-from tetra_drake.settings.quantities import Time, by_name
+from tetra_drake.settings.quantities import TWO, Time, by_name
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Kinds, Section
 
@@ -93,7 +93,7 @@ class QualityDiversity(OptimizerSettings):
 
     measures: Annotated[
         dict[str, list[float]],
-        *by_name(UNITS, lambda x: Annotated[list[x], Field(min_length=2, max_length=2)]),
+        *by_name(UNITS, lambda x: Annotated[list[x], TWO]),
     ] = Field(default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]})
     """Two metrics with their ranges on the map; cells at the edge also have what is outside."""
     cells: list[CellCount] = Field(default=[20, 20], min_length=2, max_length=2)

@@ -41,6 +41,7 @@ from tetra_drake.scenario.structure_graph import (
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.quantities import (
+    THREE,
     Acceleration,
     Damping,
     Density,
@@ -92,7 +93,7 @@ def _check_name(name: object) -> object:
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
 BareLength = Annotated[Length, Field(json_schema_extra={"if": False})]
 """A length that needs no unit where the structure has one."""
-Coordinates = Annotated[list[BareLength], Field(min_length=3, max_length=3)]
+Coordinates = Annotated[list[BareLength], THREE]
 CablePath = Annotated[list[str], Field(min_length=2, max_length=MOST_NODES)]
 AnchorAxes = Annotated[
     Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
@@ -329,9 +330,7 @@ class StructureFile(RobotSettings):
     masses: Keyed[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
     as a payload."""
-    loads: Keyed[str, Annotated[list[ForceQuantity], Field(min_length=3, max_length=3)]] = Field(
-        default={}
-    )
+    loads: Keyed[str, Annotated[list[ForceQuantity], THREE]] = Field(default={})
     """Constant forces [x, y, z] on nodes, in the world frame."""
     anchors: Keyed[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz; nodes of struts by a spring and a

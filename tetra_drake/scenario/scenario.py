@@ -220,9 +220,7 @@ class Scenario(World):
             own = [name for name in self.values() if name.startswith(BODY_SECTIONS)]
             refuse(place, f"'{key}' is no number of the scenario; {hint(key, own)}")
         if isinstance(value, int) and not isinstance(value, bool):
-            refuse(
-                place, f"'{key}' is a count, expected a number that leaves the structure as it is"
-            )
+            refuse(place, f"'{key}' is a count, expected a number that keeps the structure")
         if not isinstance(value, float):
             example = f", such as {key}[0]" if isinstance(value, list) else ""
             refuse(place, f"found {described(value)}, expected the key of a number{example}")

@@ -9,21 +9,20 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from tetra_drake.settings.quantities import Angle, Keyed, quantity
+from tetra_drake.settings.quantities import THREE, Angle, Keyed, quantity
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-_THREE = Field(min_length=3, max_length=3)
 _NONE = Field(default=[0.0, 0.0, 0.0])
 
 
 class Turn(Section):
     """Rotation: about an axis; then by roll, pitch and yaw about x, y and z of the world."""
 
-    axis: Annotated[list[float], _THREE] = Field(default=[0.0, 0.0, 1.0])
+    axis: Annotated[list[float], THREE] = Field(default=[0.0, 0.0, 1.0])
     angle: Angle = 0.0
     roll: Angle = 0.0
     pitch: Angle = 0.0
@@ -39,9 +38,9 @@ class Turn(Section):
 class BodyStart(Section):
     """Start of one body, in addition to the robot's."""
 
-    velocity: Annotated[list[Annotated[float, *quantity("m/s")]], _THREE] = _NONE
+    velocity: Annotated[list[Annotated[float, *quantity("m/s")]], THREE] = _NONE
     """Velocity [x, y, z] of the centre of mass."""
-    spin: Annotated[list[Annotated[float, *quantity("rad/s")]], _THREE] = _NONE
+    spin: Annotated[list[Annotated[float, *quantity("rad/s")]], THREE] = _NONE
     """Angular velocity [x, y, z], about the centre of mass."""
     turned: Turn | None = Field(default=None, exclude_if=operator.not_)
     """Rotation about the centre of mass: about `axis` by `angle`, then by roll, pitch and yaw."""
@@ -70,7 +69,7 @@ class Start(BodyStart):
 class Push(Section):
     """Impulse on a body or a node."""
 
-    impulse: Annotated[list[Annotated[float, *quantity("N*s")]], _THREE]
+    impulse: Annotated[list[Annotated[float, *quantity("N*s")]], THREE]
     """Impulse [x, y, z], along the axes of the world."""
     on: str
     """Name of a node, or of a body, which is pushed at its centre of mass."""

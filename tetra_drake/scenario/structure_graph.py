@@ -6,15 +6,15 @@ import itertools
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple, Protocol, TypeVar
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, ValidationError
 
-from tetra_drake.settings.quantities import Keyed
+from tetra_drake.settings.quantities import TWO, Keyed
 from tetra_drake.settings.refusals import hint, refuse
 from tetra_drake.settings.section import Tree, tree_value
 
 NodeT = TypeVar("NodeT", bound=Hashable)
 
-Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
+Pair = Annotated[list[str], TWO]
 """Names of two nodes."""
 
 

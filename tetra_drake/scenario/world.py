@@ -266,9 +266,9 @@ class World(Section):
             return self
         check_taken(self.events, self.robot.blueprint())
         changeable = [key for key in self.numbers() if key.startswith(CHANGEABLE)]
-        order = sorted(range(len(self.events)), key=lambda i: self.events[i].at)
-        for i, events in zip(order, up_to_each(self.events), strict=True):
-            place, event = f"events[{i}]", self.events[i]
+        for events in up_to_each(self.events):
+            event = events[-1]
+            place = f"events[{self.events.index(event)}]"
             self._check_time(f"{place}.at", event.at)
             if not (event.cut or event.lose or event.change or event.push):
                 refuse(place, "changes nothing, expected cut, lose, change or push")

@@ -91,7 +91,10 @@ Stiffness = Annotated[float, *quantity("N/m")]
 Damping = Annotated[float, *quantity("N*s/m")]
 DampingPerLength = Annotated[float, *quantity("N*s/m^2")]
 
-Position = Annotated[list[Length], Field(min_length=3, max_length=3)]
+TWO, THREE = Field(min_length=2, max_length=2), Field(min_length=3, max_length=3)
+"""Annotations of lists with two or three items."""
+
+Position = Annotated[list[Length], THREE]
 """Coordinates x, y and z."""
 
 
@@ -102,7 +105,7 @@ def _ascending(pair: list[float]) -> list[float]:
     return pair
 
 
-PAIR = Field(min_length=2, max_length=2), AfterValidator(_ascending)
+PAIR = TWO, AfterValidator(_ascending)
 """Annotations of a list with a least and a greatest value."""
 
 EMPTY: dict[str, Any] = {"type": ["object", "null"]}

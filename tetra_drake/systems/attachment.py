@@ -123,11 +123,10 @@ def BodyStates_(T: type) -> type:
         def _construct(self, bodies: int, *, converter: SystemScalarConverter) -> None:
             LeafSystem_[T].__init__(self, converter)
             self._bodies = bodies
-            poses, velocities = [RigidTransform_[T]()], [SpatialVelocity_[T]()]
-            self._poses = self.DeclareAbstractInputPort("body_poses", AbstractValue.Make(poses))
-            self._velocities = self.DeclareAbstractInputPort(
-                "spatial_velocities", AbstractValue.Make(velocities)
-            )
+            poses = AbstractValue.Make([RigidTransform_[T]()])
+            velocities = AbstractValue.Make([SpatialVelocity_[T]()])
+            self._poses = self.DeclareAbstractInputPort("body_poses", poses)
+            self._velocities = self.DeclareAbstractInputPort("spatial_velocities", velocities)
             sources = {self._poses.ticket(), self._velocities.ticket()}
             self.DeclareVectorOutputPort("state", 13 * bodies, self._calc_state, sources)
 

@@ -99,7 +99,7 @@ def MakeTensegrityDiagram(
       simulation it is shown in `meshcat`, where bodies can be dragged with the mouse while Ctrl is
       held, if Drake has MeshcatMouseSpring; pages and films are made from trajectories.
 
-    `steering`, a function from the time (s) to the turn, replaces the gait's turn, -1 to 1.
+    `steering`, a turn (-1 to 1) or a function from the time (s) to it, replaces the gait's turn.
 
     Input ports of the diagram: turn of steering; signals (m,) in N without gait and
     controller, one for each of the structure's m `oscillators`; ports of the controller. Output
@@ -285,9 +285,7 @@ def _AddGround(
         problem = "expected an input port 'state' and an output port 'generalized_force'"
         raise InputError(source, "ground", problem)
     if robot.scenario.cpg.feedback and not ground.HasOutputPort("mode_table"):
-        raise InputError(
-            source, "ground", "expected an output port 'mode_table' for `cpg.feedback`"
-        )
+        raise InputError(source, "ground", "`cpg.feedback` needs an output port 'mode_table'")
     _check_size(ground.GetInputPort("state"), 13 * bodies, key="ground")
     _check_size(ground.GetOutputPort("generalized_force"), 6 * bodies, key="ground")
     Attach(builder, plant, builder.AddNamedSystem("ground", ground))

@@ -1,4 +1,4 @@
-"""The equations of motion, against Drake's plant and the laws of conservation."""
+"""The implicit matrix of the equations of motion, against differences of the forces."""
 
 import numpy as np
 import pytest

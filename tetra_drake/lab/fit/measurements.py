@@ -240,14 +240,7 @@ class MotionCapture(_Placed):
         is_free = self.origin is self.turn is None and markers >= MARKERS
         frame = None if is_free else self.frame()
         share = self.uncertainty / self.marker_offset if self.marker_offset else 0.0
-        found = nearest(
-            lambda shift: positions(times(shift)),
-            lambda shift: axes(times(shift)),
-            seen,
-            clock=clock,
-            frame=frame,
-            share=share,
-        )
+        found = nearest(positions, axes, times, seen, clock=clock, frame=frame, share=share)
         notes = list[str]()
         if self.marker_offset:
             beside = 1e3 * np.linalg.norm(found.offsets, axis=1)

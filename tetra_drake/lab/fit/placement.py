@@ -22,8 +22,8 @@ EXACT = 1e-10
 """Relative tolerance of the refinement, in the sum of squares and in the unknowns."""
 
 Frame = tuple[np.ndarray, np.ndarray]
-OverTime = Callable[[float], np.ndarray]
-"""Something that moves, at the times of a log for an offset (s) of its clock."""
+OverTime = Callable[[np.ndarray], np.ndarray]
+"""Something that moves, at times (times,) in s."""
 
 
 class Placement(NamedTuple):
@@ -49,6 +49,7 @@ def aligned(p: np.ndarray, seen: np.ndarray) -> Frame:
 def nearest(
     places: OverTime,
     axes: OverTime,
+    times: Callable[[float], np.ndarray],
     seen: np.ndarray,
     *,
     clock: tuple[float, float],
@@ -60,6 +61,7 @@ def nearest(
     Args:
         places: positions of the nodes (times, nodes, 3) in m.
         axes: rotation matrices of their bodies (times, nodes, 3, 3).
+        times: times (times,) in s of a log for an offset (s) of its clock.
         seen: positions of the markers, NaN in gaps.
         clock: least and greatest offset of the clock in s.
         frame: the frame; None to find it.
@@ -71,11 +73,11 @@ def nearest(
     whole, counts = is_whole[:, :, 0], is_whole.sum(axis=0)
 
     def placed(shift: float, frame: Frame | None) -> Placement:
-        p = places(shift)
+        p = places(times(shift))
         turn, origin = frame = frame or aligned(p[whole], seen[whole])
         offsets = np.zeros(p.shape[1:])
         if share:
-            R = axes(shift)
+            R = axes(times(shift))
             beside = np.einsum("tnij,tni->tnj", R, (seen - origin) @ turn - p)
             offsets = np.where(is_whole, beside, 0.0).sum(axis=0) / (counts + share**2)
             p = p + np.einsum("tnij,nj->tni", R, offsets)

@@ -77,14 +77,7 @@ that rolls, by default on `roll`."""
 
 _SOURCE, _MASK, _RENDERED = "tetra_drake.gym", "reset_mask", "rgb_array"
 
-_OF_EPISODES = (
-    "start",
-    "steady",
-    "offsets",
-    "rewarded",
-    "steps",
-    "going",
-)
+_OF_EPISODES = ("start", "steady", "offsets", "rewarded", "going")
 """Attributes of _Episodes, without underscore, that are the state of the episodes."""
 
 
@@ -123,7 +116,7 @@ class _Episodes:
         # Positions p_WN (N, nodes, 3) at the start and at `simulation.steady_from`.
         self._start, self._steady = start.p_WN, start.p_WN.copy()
         self._offsets, self._rewarded = np.zeros(count), np.zeros(count)
-        self._steps, self._going = np.zeros(count, dtype=int), np.zeros(count, dtype=bool)
+        self._going = np.zeros(count, dtype=bool)
 
     def reset(self, places: np.ndarray, generators: Sequence[np.random.Generator]) -> np.ndarray:
         """Begins episodes of the robots with the indices `places`. There is a generator for each
@@ -132,7 +125,7 @@ class _Episodes:
         seeds = [int(generators[place].integers(2**31)) for place in places]
         seen = self.simulation.reset(seed=seeds, indices=places)
         readings = self.simulation.state
-        self._steps[places], self._going[places] = 0, True
+        self._going[places] = True
         for place in places.tolist():
             self._start[place] = self._steady[place] = readings.p_WN[place]
             self._rewarded[place] = 0.0
@@ -151,7 +144,6 @@ class _Episodes:
             raise InputError(_SOURCE, "step", f"robot {over[0]} has no episode; reset() begins one")
         seen = simulation.step(self._setpoints(actions), indices=places)
         readings = simulation.state
-        self._steps[places] += 1
         early = readings.time <= self._scenario.simulation.settling_time
         self._steady[early] = readings.p_WN[early]
         terminated = np.array([failure is not None for failure in simulation.failures])
@@ -165,7 +157,8 @@ class _Episodes:
                 terminated[place], truncated[place] = True, False
         fitness[terminated] = 0.0
         if self._most_steps is not None:
-            truncated |= ~terminated & (self._steps >= self._most_steps)
+            steps = readings.time / simulation.control_period
+            truncated |= ~terminated & (steps > self._most_steps - 0.5)
         self._going &= ~(terminated | truncated)
         rewards = fitness - self._rewarded
         self._rewarded = fitness
@@ -180,7 +173,7 @@ class _Episodes:
     def restore(self, states: States) -> np.ndarray:
         """Puts all robots and their episodes into saved states; returns the observations."""
         check_type(_SOURCE, "states", states, States)
-        if "episode.steps" not in states.tables:
+        if "episode.going" not in states.tables:
             problem = "found states of a simulation, expected states of an environment"
             raise InputError(_SOURCE, "states", problem)
         readings = self.simulation.restore(states)

@@ -319,12 +319,8 @@ class Simulation:
             given = states.tables.get(name, np.zeros(0))
             if (given.dtype, given.shape) != (table.dtype, (len(states), *table.shape[1:])):
                 raise InputError("Simulation", f"states.{name}", "is no table of states")
-        count = len(which)
-        own = {
-            name: np.broadcast_to(table, (count, *table.shape[1:]))
-            for name, table in states.tables.items()
-        }
-        identities = states.robots * (count // len(states) if len(states) else 0)
+        states = states[[0] * len(which)] if len(states) == 1 else states
+        own, identities = states.tables, states.robots
         steps = self._steps_until(own["pause"])
         with self._used("restore"):
             known = dict(zip(self._identities, self._robots, strict=True))

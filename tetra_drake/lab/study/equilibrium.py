@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 import os
 from collections.abc import Callable
@@ -15,7 +16,6 @@ from typing import Any
 import numpy as np
 import pandas
 from scipy import linalg
-from scipy.spatial.transform import Rotation
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
@@ -31,6 +31,7 @@ from tetra_drake.on_demand import loaded
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.equilibrium import (
     Unactuated,
+    displace,
     force_at_rest,
     free_motions,
     mass_matrix,
@@ -55,9 +56,9 @@ _LARGE = 50
 """Number of bodies from which modes are not computed."""
 _FREQUENCIES = 5
 """Number of natural frequencies that are printed."""
-_SWING, _STILL, _AMPLITUDE = 75, 2, 0.12
-"""Number of frames of a mode on the page, and of a robot at rest; greatest displacement of a node,
-as a share of the size of the robot."""
+_SWING, _AMPLITUDE = 75, 0.12
+"""Number of frames of a mode on the page; greatest displacement of a node, as a share of the size
+of the robot."""
 _NOISE = 1e-9
 """Forces of anchors, and negative squares of frequencies, up to this share of the greatest are
 rounding errors."""
@@ -382,20 +383,14 @@ def _swinging(study: EquilibriumStudy, motions: np.ndarray) -> np.ndarray:
     """States (frames, 13 * bodies) of a robot that swings in modes with these motions of its bodies
     (modes, bodies, 6), twice in each, in _SWING frames each, and rests in the end. The node that
     moves farthest moves by the share _AMPLITUDE of the robot's size. A robot without modes rests
-    for _STILL frames."""
-    bodies, rest = len(study.robot.structure.bodies), study.robot.equilibrium.state
-    if not len(motions):
-        return np.tile(rest, (_STILL, 1))
-    states = np.tile(rest, (len(motions) * _SWING + 1, 1))
+    for two frames."""
+    rest = study.robot.equilibrium.state
+    states = np.tile(rest, (max(len(motions) * _SWING, 1) + 1, 1))
     size = float(np.ptp(study.nodes[["x", "y", "z"]].to_numpy(), axis=0).max())
     swing = -1j * np.exp(4j * math.pi * np.arange(_SWING) / _SWING)  # begins at rest if real
     moved = _AMPLITUDE * size * (motions[:, np.newaxis] * swing[:, np.newaxis, np.newaxis]).real
-    poses = states[:-1, : 7 * bodies].reshape(-1, 7)
-    turns, ways = np.split(moved.reshape(-1, 6), 2, axis=1)
-    turned = Rotation.from_rotvec(turns) * Rotation.from_quat(poses[:, [1, 2, 3, 0]])
-    poses[:, [1, 2, 3, 0]] = turned.as_quat()
-    poses[:, 4:] += ways
-    states[:-1, : 7 * bodies] = poses.reshape(len(states) - 1, -1)
+    for frame, motion in zip(states, itertools.chain(*moved), strict=False):
+        displace(rest, motion.ravel(), frame)
     return states
 
 
