@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.converged import shortly
 from helpers.judgements import judgement_by_hand
 from helpers.quantities import with_unit
-from helpers.synthetic_run import tiny_scenario
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.study import robustness
@@ -23,10 +23,7 @@ DRAWS = 3
 @pytest.fixture(scope="module")
 def scenario():
     """A short walk on rough ground, in which the oscillators start at once."""
-    tiny = tiny_scenario(name="rough")
-    rough = load_scenario("rough")
-    ground = {"terrain": rough.terrain, "friction": rough.friction}
-    return tiny.with_changes({"cpg.start_up": 0.0, "robot.contacts": "all", **ground})
+    return shortly(load_scenario("rough"), 0.3, robot__tetrahedra=3)
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.converged import shortly
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import Simulator
 
@@ -21,8 +22,7 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 PAGE = Path(td.__file__).parent / "scenario" / "README.md"
 ROWS = [line.strip("| ").split(" | ") for line in PAGE.read_text("utf-8").splitlines()]
 TABLE = {row[0].strip("`"): row[1:] for row in ROWS if row[-1] in ("reads", "leaves")}
-SHORT = {"simulation.duration": "40 ms", "simulation.steady_from": "0 s", "cpg.start_up": "0 s"}
-PRISM = td.load_scenario("prism").with_changes(SHORT | {"engine": "!Compiled"})
+PRISM = shortly(td.load_scenario("prism"), 0.04, engine="!Compiled")
 SECTIONS: dict[str, Any] = {
     "events": [{"at": "2 ms", "cut": ["side n0 n3", "top n3 n4"]}],
     "policy": "!Rolling {clock: 0.1 s}",
