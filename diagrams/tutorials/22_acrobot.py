@@ -87,7 +87,7 @@ builder.Connect(regulator.get_output_port(), acrobot.get_input_port())
 log = LogVectorOutput(acrobot.get_output_port(), builder, 0.02)
 simulator = Simulator(builder.Build())
 simulator.get_mutable_context().SetContinuousState([0.05, 0.0, 0.0, 0.0])  # not at the start
-simulator.AdvanceTo(8.0)
+simulator.AdvanceTo(states.end_time() + 4.0)
 
 # %% The planned and the simulated angles.
 moved, figure = log.FindLog(simulator.get_context()), Figure((7, 3), layout="constrained")
