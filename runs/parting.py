@@ -15,7 +15,6 @@ from tetra_drake.evolution.run import Run
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.parameter_space import ParameterSpace, Vector
-from tetra_drake.scenario.metrics import METRICS
 
 
 def made(run: Run, trial: int) -> pandas.DataFrame:
@@ -31,9 +30,9 @@ def asked(run: Run, trial: int, most: int | None = None) -> list[Vector]:
     make, space = optimizer_of(scenario.optimizer), ParameterSpace.of(scenario)
     optimizer = make(space, scenario.evolution, np.random.default_rng(seed))
     record = made(run, trial).head(most)
-    metrics = record[record.columns.intersection(list(METRICS))].to_dict("records")
+    measures = record[list(getattr(scenario.optimizer, "measures", []))].to_dict("records")
     fitnesses = record["fitness"].fillna(-np.inf)
-    told = [Evaluation(*pair) for pair in zip(fitnesses, metrics, strict=True)]
+    told = [Evaluation(*pair) for pair in zip(fitnesses, measures, strict=True)]
     vectors: list[Vector] = []
     while len(vectors) < len(told):
         first = len(vectors)
