@@ -21,8 +21,10 @@ The ground must be a plane, level or inclined, or there is none.
 
 from __future__ import annotations
 
+import bisect
 import itertools
 import math
+import operator
 from time import perf_counter
 from typing import Any
 
@@ -278,7 +280,9 @@ class _MujocoRobot:
         """Signals (times, m) in N at simulated times (s) (times,)."""
         if not self._driven.pilot:
             return self._driven.signals_at(times)
-        bends, signals = zip(*self._bends, strict=True)
+        earliest = np.min(times, initial=math.inf)
+        first = max(0, bisect.bisect_right(self._bends, earliest, key=operator.itemgetter(0)) - 1)
+        bends, signals = zip(*self._bends[first:], strict=True)
         return interpolated(times, bends, signals)
 
     def _stepped(self, rollout: Any, signals: Array) -> tuple[Array, Array]:
