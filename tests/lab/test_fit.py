@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.evolution.entries import json_line
 from tetra_drake.formatting import silent
 from tetra_drake.lab.fit import measurements
 from tetra_drake.lab.fit.fit import fit
@@ -206,15 +207,16 @@ def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch, by_formu
     again = fit(hung(), cases, BOUNDS, search=True, out=tmp_path)
     assert len(predicted) == needed
     assert again.parameters.equals(whole.parameters)
-    # Damaged evaluations are simulated again: torn, changed by a bit, of another name. So is the
-    # solution, for the clocks and notes of logs.
-    torn, changed, swapped = sorted((tmp_path / "evaluations").iterdir())[:3]
+    # Damaged evaluations are simulated again: torn, changed by a bit, of another name or record. So
+    # is the solution, for the clocks and notes of logs.
+    torn, changed, swapped, foreign = sorted((tmp_path / "evaluations").iterdir())[:4]
+    foreign.write_text(json_line({"trial": 0, "index": 1}))
     swapped.write_bytes(changed.read_bytes())
     torn.write_bytes(torn.read_bytes()[:-8])
     changed.write_bytes(bytes(32) + changed.read_bytes()[32:])
     again = fit(hung(), cases, BOUNDS, search=True, out=tmp_path)
     assert again.parameters.equals(whole.parameters)
-    assert sum(predicted[needed:]) == (3 + 1) * len(cases)
+    assert sum(predicted[needed:]) == (4 + 1) * len(cases)
     needed = len(predicted)
     # Other values are other evaluations.
     fit(hung().with_changes({DAMPING: "1 N*s/m"}), cases, BOUNDS, out=tmp_path)

@@ -223,10 +223,10 @@ class FitProblem:
         files = {name: self._kept / f"{name}.jsonl" for name in unknown} if self._kept else {}
         for name, file in files.items():
             with contextlib.suppress(InputError):  # a missing or damaged evaluation is made again
-                for entry in entries_of(file):
-                    if entry["name"] == name:
-                        self._known[name] = np.array(entry["numbers"], dtype=float)
-                        del unknown[name]
+                kept = next(entries_of(file), {})
+                if kept.get("name") == name:
+                    self._known[name] = np.array(kept["numbers"], dtype=float)
+                    del unknown[name]
         if not unknown:
             return
         scenarios = [self.scenario_at(point) for point in unknown.values()]
