@@ -171,13 +171,14 @@ def simulate_each(
                 yield error
 
 
-def check_scenario(scenario: Scenario, gait: Gait | None = None) -> None:
+def check_scenario(scenario: Scenario, *gaits: Gait) -> None:
     """Raises InputError if gaits cannot be simulated on a scenario: its engine does not support it,
-    the robot would start in the ground, or no oscillator drives it. Also if `gait` is for another
-    robot."""
+    the robot would start in the ground, or no oscillator drives it. Also if one of `gaits` is for
+    another robot."""
     if not scenario.oscillators:
         problem = "found no oscillator, expected at least one that drives cables"
         raise InputError(scenario.name, "robot.actuated", problem)
-    robot, walking = Robot.of(scenario), gait or seeded_gait(scenario)
-    driven_robot(scenario, walking, robot=robot).oscillators  # noqa: B018
+    robot = Robot.of(scenario)
+    for gait in gaits or [seeded_gait(scenario)]:
+        driven_robot(scenario, gait, robot=robot).oscillators  # noqa: B018
     engine_of(scenario).check(scenario)

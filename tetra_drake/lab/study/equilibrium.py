@@ -152,7 +152,7 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     if isinstance(given, Robot):
         robot = given
     elif is_file and format_of(str(given)) != "scenario":
-        robot = robot_of_file(str(given))
+        robot = robot_of_structure(read_structure(str(given)), str(given))
     else:
         robot = Robot.of(given_scenario(given))
     structure, equilibrium = robot.structure, robot.equilibrium

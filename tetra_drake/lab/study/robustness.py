@@ -211,13 +211,13 @@ def _simulated(
 
     A robot that cannot start is a failure; it may have been displaced into a step of the terrain.
     """
-    for own, gait in walkers.values():
-        check_scenario(own, gait)
     bodies = {id(own): own for own, _ in walkers.values()}
+    for body in bodies.values():
+        check_scenario(body, *(gait for own, gait in walkers.values() if own is body))
     rows: list[dict[str, Any]] = []
     walks: list[tuple[Scenario, Gait]] = []
     for labels, draw in plan:  # gaits share a scenario: the engine prepares it once
-        changed = {body: disturbed(own, draw) for body, own in bodies.items()}
+        changed = {place: disturbed(body, draw) for place, body in bodies.items()}
         rows += [{"gait": key, **labels, "failure": None, "missed": ""} for key in walkers]
         walks += [(changed[id(own)], gait) for own, gait in walkers.values()]
     results = simulate_each(walks, threads=threads)
