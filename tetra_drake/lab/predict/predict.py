@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
-import itertools
 import math
 import re
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import NoneType
@@ -313,12 +313,14 @@ def _values(
 ) -> list[list[float] | Exception]:
     """Values of the measures for each scenario, NaN if not finite; or why there are none."""
     able = [each for each in scenarios if isinstance(each, Scenario)]
-    outcomes: Iterable[Outcome | InputError | None] = [None] * len(able)
-    if driver is not None:
+    if driver is None:
+        found = iter([_measured(each, None, measures) for each in able])
+    else:
         walks, record = [(each, driver) for each in able], any(map(callable, measures.values()))
-        outcomes = simulate_each(walks, record=record, threads=threads)
-    values = map(_measured, able, outcomes, itertools.repeat(measures))
-    return [next(values) if isinstance(each, Scenario) else each for each in scenarios]
+        with contextlib.closing(simulate_each(walks, record=record, threads=threads)) as outcomes:
+            pairs = zip(able, outcomes, strict=True)
+            found = iter([_measured(each, outcome, measures) for each, outcome in pairs])
+    return [next(found) if isinstance(each, Scenario) else each for each in scenarios]
 
 
 def _measured(
