@@ -37,7 +37,6 @@ from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.parameter_space import ParameterSpace, Vector, with_body
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS, MetricRanges
-from tetra_drake.scenario.policy_kinds import PythonPolicy
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH
 
@@ -370,8 +369,8 @@ def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent
 
 def tell_code(scenario: Scenario, folder: Path) -> None:
     """Tells in the log which code a simulation of a recorded scenario runs."""
-    if isinstance(scenario.policy, PythonPolicy):
-        _LOG.warning("%s: its policy runs the Python function %s", folder, scenario.policy.function)
+    if scenario.policy is not None and scenario.policy.code:
+        _LOG.warning("%s: its policy runs the Python function %s", folder, scenario.policy.code)
 
 
 def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:

@@ -61,6 +61,11 @@ class DrivenRobots(NamedTuple):
 class PolicyKind(Section):
     """Base class for the settings of a policy."""
 
+    @property
+    def code(self) -> str:
+        """Function outside the package that the policy runs; "" for none."""
+        return ""
+
     def parameters(self, blueprint: Blueprint) -> Mapping[str, PolicyBounds]:
         """Names of the policy's parameters for a robot, with their bounds in random policies. A
         search may leave the bounds."""

@@ -165,6 +165,10 @@ class PythonPolicy(PolicyKind):
     bounds: Annotated[list[float], *PAIR] = Field(default=[-1.0, 1.0])
     """Least and greatest parameter in random policies."""
 
+    @property
+    def code(self) -> str:
+        return self.function
+
     def parameters(self, blueprint: Blueprint) -> Mapping[str, PolicyBounds]:
         low, high = self.bounds
         return {f"parameter {i + 1}": (low, high) for i in range(self.count)}
