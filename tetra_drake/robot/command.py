@@ -86,7 +86,7 @@ def driven_robot(
         if scenario.policy is None:
             return DrivenRobot.of(robot, driver, steering=steering)
         if steering is not None:
-            raise InputError("steering", "", f"found some, and {driver.name} is for a policy")
+            raise InputError("steering", "", f"found a turn, but {driver.name} is for a policy")
         own = scenario.policy.gait_parameters(robot.structure)
         given = check_parameters(driver.parameters, own, f"gait {driver.name}", "parameters")
         values, step = np.array([*given.values()], dtype=float), scenario.cpg.listing_step

@@ -140,7 +140,7 @@ class _MjcfTranslation:
         for eq in self._equalities(mujoco.mjtEq.mjEQ_WELD):
             first, second = sorted(root for root, _ in self._ends_of(eq))
             self.roots[self.roots == second] = first
-        self.joins = [*self._joins()]
+        self.pivots = [*self._pivots()]
         """Name, ends and dry friction of each connect and ball joint; see _ends_of()."""
         self.laws = tendon_laws(model, self.driven)
         """Stiffness, damping and free length of each tendon, or of its limit (tendons, 3)."""
@@ -157,7 +157,7 @@ class _MjcfTranslation:
         """Content of the structure file."""
         paths, roots = dict(self._paths()), self.roots[self.model.site_bodyid].tolist()
         on_paths = {*itertools.chain(*paths.values())}
-        reached = {root for _, ends, _ in self.joins for root, _ in ends}
+        reached = {root for _, ends, _ in self.pivots for root, _ in ends}
         used = sorted(({roots[site] for site in on_paths} | reached) - {_WORLD})
         for root in sorted({*self.roots.tolist()} - {*used, _WORLD}):
             self._note("bodies that no tendon and no joint reaches, left out", "body", root)
@@ -375,7 +375,9 @@ class _MjcfTranslation:
             "spin": [_text(x, "rad/s") for x in spin.tolist()],
         }
 
-    def _joins(self) -> Iterator[tuple[str, list[tuple[int, np.ndarray]], float]]:
+    def _pivots(self) -> Iterator[tuple[str, list[tuple[int, np.ndarray]], float]]:
+        """See `pivots`. Actuators that brake a connect, as make_mjcf() writes them, are its
+        friction, and drive nothing else."""
         model, mujoco = self.model, self.mujoco
         is_brake = model.actuator_forcelimited & (self.pushes[:, 2] < 0.0)
         is_brake &= model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
@@ -397,7 +399,7 @@ class _MjcfTranslation:
         """Joints of two bodies, and anchors, from joints with the world."""
         joints: Tree = {}
         anchors: Tree = {}
-        for given, both, friction in self.joins:
+        for given, both, friction in self.pivots:
             ends = [end for end in both if end[0] != _WORLD]
             name = _plain(given, joints)
             nodes = [self._node(*end, f"{name}-{i}") for i, end in enumerate(ends, 1)]
