@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import re
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -137,13 +138,9 @@ def test_a_draw_that_fails_or_cannot_start_fails_its_gait(tiny, vector, change, 
 
 
 def test_all_gaits_of_an_iteration_share_its_draws_which_are_recorded(tmp_path, monkeypatch):
-    seeds = []
-
-    def evaluate(task):
-        seeds.append(task.seed)
-        return analytic.DrawnBowl()(task)
-
+    evaluate = Mock(wraps=analytic.DrawnBowl())
     analytic.record_run(tmp_path, analytic.drawn_scenario(), evaluate=evaluate)
+    seeds = [call.args[0].seed for call in evaluate.call_args_list]
     iterations = [0] * 12 + [i for i in range(1, 16) for _ in range(2)]
     assert sorted(seeds) == [(5, trial, i) for trial in (0, 1) for i in iterations]
 
