@@ -54,11 +54,13 @@ def pulled_down(stiffness: float = 210.0, free_length: float = 0.39) -> list[Res
 
 @pytest.fixture
 def by_formula(monkeypatch):
-    """Rest predicts the bar's heights as pulled_down() has them, without an equilibrium."""
-    weight, below = Robot.of(hung()).weight, {"a z": 0.0, "b z": 0.2}
+    """Rest predicts the bar's heights as pulled_down() has them, without an equilibrium, and with a
+    wave over the stiffness, 0 at 310 N/m: of this height and number."""
+    weight, below, wave = Robot.of(hung()).weight, {"a z": 0.0, "b z": 0.2}, [0.0, 0.0]
 
     def height(line, pull):
-        return 1.0 - line.free_length - (weight + pull) / line.stiffness
+        ripple = wave[0] * np.sin(wave[1] * (line.stiffness - 310.0))
+        return 1.0 - line.free_length - (weight + pull) / line.stiffness + ripple
 
     def predict(self, scenarios):
         ((*_, load),) = self.changes.values()
@@ -68,6 +70,7 @@ def by_formula(monkeypatch):
         return [Prediction(z - places) for z in a]
 
     monkeypatch.setattr(Rest, "predict", predict)
+    return wave
 
 
 def test_exact_measurements_give_the_constants_and_intervals_of_a_line(by_formula):
@@ -143,26 +146,8 @@ def test_a_tension_and_a_frequency_give_two_equal_masses_and_the_stiffness():
     assert found.residuals["uncertainty"].unique().tolist() == [1.0, 0.05]
 
 
-@pytest.fixture
-def add_waves(monkeypatch, by_formula):
-    """add_waves(height, number): adds a wave over the stiffness, 0 at 310 N/m, to predictions."""
-
-    def add(height, number):
-        predict = Rest.predict
-
-        def predict_wavy(self, scenarios):
-            stiffness = np.array([each.robot.cables["line"].stiffness for each in scenarios])
-            waves = height * np.sin(number * (stiffness - 310.0))
-            found = zip(predict(self, scenarios), waves, strict=True)
-            return [each._replace(values=each.values + wave) for each, wave in found]
-
-        monkeypatch.setattr(Rest, "predict", predict_wavy)
-
-    return add
-
-
-def test_predictions_that_are_not_smooth_have_no_intervals(add_waves):
-    add_waves(2e-4, 1.3e3)
+def test_predictions_that_are_not_smooth_have_no_intervals(by_formula):
+    by_formula[:] = 2e-4, 1.3e3
     found = fit(hung(), pulled_down(), BOUNDS)
     assert found.parameters["determined"].all() and found.parameters["low"].isna().all()
     (warning,) = [each for each in found.warnings if STIFFNESS in each and "smooth" in each]
@@ -170,10 +155,10 @@ def test_predictions_that_are_not_smooth_have_no_intervals(add_waves):
     assert found.misfit < 1.0 and "explain" in warning
 
 
-def test_a_search_finds_the_deepest_of_many_minima(add_waves, monkeypatch):
+def test_a_search_finds_the_deepest_of_many_minima(by_formula, monkeypatch):
     monkeypatch.setattr("tetra_drake.lab.fit.fit.MOST", 160)
     cases = pulled_down(310.0, 0.4)[:: len(PULLS) - 1]
-    add_waves(5e-3, 0.2)
+    by_formula[:] = 5e-3, 0.2
     near, found = (fit(hung(), cases, ALONE, search=search) for search in (False, True))
     assert near.misfit > 10.0
     assert found.parameters["value"][STIFFNESS] == pytest.approx(310.0, rel=1e-4)
