@@ -274,7 +274,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     def _setpoints(self, actions: np.ndarray) -> np.ndarray:
         """Setpoints (N, driven cables) of the actuators, in SI units, for actions (N, actions) of
         the environment. Each is a force, free length or tension, depending on the actuators."""
-        shape = self.num_envs, *self.single_action_space.shape
+        shape = self.num_envs, self._groups.max() + 1
         actions = checked_actions(actions, shape, source=_SOURCE)
         signals = self._scenario.cpg.usual_amplitude * actions[:, self._groups]
         return np.asarray(self._scenario.actuation.commands(self._cables._replace(signal=signals)))
