@@ -31,7 +31,7 @@ from tetra_drake.scenario.structure_graph import (
     components,
     members,
     struts_by_name,
-    with_joints,
+    unused_name,
 )
 from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.plugins import origin
@@ -529,16 +529,13 @@ class StructureFile(RobotSettings):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _prepare(cls, tree: Any) -> Any:
-        """Checks the content of a structure file before its fields are read, and completes it.
+        """Checks the unit of a structure file before its fields are read, and completes them.
 
-        Replaces `pinned` by joints. Nodes get the unit of the key `unit` where their coordinates
-        are bare numbers. Afterwards `unit` is "mm" or None: a robot in mm is shown in mm, for
-        others Scenario.units chooses the unit by size.
+        Nodes get the unit of the key `unit` where their coordinates are bare numbers. Afterwards
+        `unit` is "mm" or None: a robot in mm is shown in mm, for others Scenario.units chooses the
+        unit by size.
         """
-        if not isinstance(tree, dict):
-            return tree
-        tree = with_joints(tree) if tree.get("pinned") else tree
-        unit = tree.get("unit")
+        unit = tree.get("unit") if isinstance(tree, dict) else None
         if unit is None:
             return tree
         try:
@@ -558,10 +555,60 @@ class StructureFile(RobotSettings):
                 section[key] = mapped(section[key], with_unit)
         return tree
 
+    def _replace_pinned(self) -> None:
+        """Puts joints in place of the pinned nodes, in this structure itself.
+
+        Struts that share a pinned node are one body there only if they also share another node, or
+        if `bodies` joins them. The body of the first strut at the node keeps it. Each other one
+        gets a copy of it, named "l-2", "l-3" and so on for the node l, and a joint with the name of
+        the copy. Refuses a pinned node that no two bodies share.
+        """
+        struts = [*members("struts", self.struts)]
+        named, index = struts_by_name(struts), {strut.key: i for i, strut in enumerate(struts)}
+        parts = [pair for group in self.struts.values() for pair in group.pairs]
+        parts += [body.nodes for body in self.bodies.values()]
+        welded: list[list[str | int]] = [
+            [part, *(node for node in nodes if node not in self.pinned)]
+            for part, nodes in enumerate(parts)
+        ]
+        for own, body in zip(welded[len(struts) :], self.bodies.values(), strict=True):
+            own += [index[strut.key] for name in body.struts for strut in named.get(name, ())]
+        body_of = {part: i for i, body in enumerate(components(welded)) for part in body}
+
+        for place, node in enumerate(self.pinned):
+            if node not in self.nodes:
+                found = f"found unknown node '{node}'; {hint(node, self.nodes)}"
+                refuse(f"pinned[{place}]", found)
+            here: dict[int, list[list[str]]] = {}
+            for part, nodes in enumerate(parts):
+                if node in nodes:
+                    here.setdefault(body_of[part], []).append(nodes)
+            if len(here) < 2:
+                expected = "expected a node that struts of two bodies share"
+                refuse(f"pinned[{place}]", f"found '{node}', {expected}")
+            for of_body in [*here.values()][1:]:
+                copy = unused_name(node, self.nodes | self.joints)
+                self.nodes[copy], self.joints[copy] = (
+                    self.nodes[node],
+                    BallJoint(nodes=[node, copy]),
+                )
+                for nodes in of_body:
+                    nodes[:] = [copy if one == node else one for one in nodes]
+
+        renamed = dict[str, str]()
+        for old, new in zip(struts, members("struts", self.struts), strict=True):
+            renamed |= dict.fromkeys(old.names, new.names[0])
+        for body in self.bodies.values():
+            body.struts[:] = [renamed.get(name, name) for name in body.struts]
+        self.pinned.clear()
+
     @pydantic.model_validator(mode="after")
     def _check(self) -> StructureFile:
-        """Refuses unknown names, members that are there twice, nodes that hang on nothing, and two
-        entries for one body. Then checks what holds for any robot, see Blueprint.check()."""
+        """Replaces `pinned` by joints. Refuses unknown names, members that are there twice, nodes
+        that hang on nothing, and two entries for one body. Then checks what holds for any robot,
+        see Blueprint.check()."""
+        if self.pinned:
+            self._replace_pinned()
         self._check_names()
         self._check_members()
         self._check_nodes()
