@@ -29,6 +29,7 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from timeit import timeit
 from typing import Any
 
 import numpy as np
@@ -117,14 +118,7 @@ def engines_table(scenario: Scenario, table: str) -> TextTable:
 def median_times(*runs: Callable[[], object]) -> np.ndarray:
     """Median wall time (s) of each function (functions,). They take turns in several rounds, so
     that other load on the machine affects all of them equally; a first round compiles."""
-    rounds = []
-    for _ in range(1 + GIVEN["rounds"]):
-        times = []
-        for run in runs:
-            started = time.perf_counter()
-            run()
-            times.append(time.perf_counter() - started)
-        rounds.append(times)
+    rounds = [[timeit(run, number=1) for run in runs] for _ in range(1 + GIVEN["rounds"])]
     return np.median(rounds[1:], axis=0)
 
 
@@ -362,10 +356,8 @@ def candidates_table(scenario: Scenario) -> TextTable:
     rows, count = [], GIVEN["candidates"]
     for name, step in {"its own": make_another, "with parameters": set_parameters}.items():
         step()
-        started = time.process_time()
-        for _ in range(count):
-            step()
-        rows.append([name, f"{1e3 * (time.process_time() - started) / count:.3g}"])
+        seconds = timeit(step, timer=time.process_time, number=count)
+        rows.append([name, f"{1e3 * seconds / count:.3g}"])
     return TextTable(["diagram", "CPU ms per robot"], rows)
 
 

@@ -19,13 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas
 from matplotlib.figure import Figure
-from measured_intervals import cases, committed, kind_and_unit, measured_rise
+from measured_intervals import cases, committed, kind_and_unit
 from measured_intervals import predicted as intervals_of
 from measured_robots import (
     AXES,
     HERE,
-    JUMPS,
-    SPRING_DAMPINGS,
+    JUMPER,
     fitted_free_lengths,
     jump,
     jumper,
@@ -167,11 +166,11 @@ def jump_figure(jumps: dict[float, list[tuple[float, float]]]) -> Figure:
     """Rise of the jumper over the share that is wound up."""
     figure, ((axes,),) = make_figure(width_in=5.0, height_in=3.2)
     shares = 100.0 * np.array(list(jumps))
-    for number, damping in enumerate(SPRING_DAMPINGS):
+    for number, damping in enumerate(JUMPER["dampings"]):
         rises = [results[number][0] for results in jumps.values()]
         style = line_style(number + 1)
         axes.plot(shares, rises, marker="o", label=f"springs damped by {damping:g} N s/m", **style)
-    ends = np.transpose([measured_rise(share) for share in jumps])
+    ends = np.transpose([*JUMPER["rises"].values()])
     wide: Any = {"color": "black", "linewidth": 6.0, "alpha": 0.4}
     axes.vlines(shares, *ends, **wide)
     axes.plot([], [], label="measured", **wide)
@@ -241,7 +240,7 @@ def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> 
     return rendered(
         "measured.md",
         **simulated,
-        measured_rises=[*JUMPS.values()],
+        rises=[*JUMPER["rises"].values()],
         rows=rows,
         totals_of=totals,
         score_of=Score.of,
@@ -255,8 +254,8 @@ def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> 
 def main(_: Sequence[str] = ()) -> None:
     """Writes the page, the numbers of simulations and the pictures."""
     rows, under_load, poses = measured_rows(), simplex_under_load(), spine_poses()
-    jumpers = [jumper(damping) for damping in SPRING_DAMPINGS]
-    jumps = {share: [jump(each, share) for each in jumpers] for share in JUMPS}
+    jumpers = [jumper(damping) for damping in JUMPER["dampings"]]
+    jumps = {share: [jump(each, share) for each in jumpers] for share in JUMPER["rises"]}
     figures = {
         "simplex": simplex_figure(under_load),
         "spine": spine_figure(poses),
