@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.study.equilibrium import study_equilibrium
-from tetra_drake.laws.cable import CableLaw, elastic_energy, elastic_stretch, elastic_tension
+from tetra_drake.laws.cable import elastic_energy, elastic_stretch, elastic_tension
 from tetra_drake.report.summary import result_text
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -57,7 +57,7 @@ def test_masses_fall_into_springs_and_are_thrown_back(engine):
         expected = solve_ivp(motion, (0.0, 0.3), start, **exact).y[0]
         np.testing.assert_allclose(length, expected, atol=5e-5)  # found: 2.6e-5, by MuJoCo
         np.testing.assert_allclose(tension, [pull(name, x - FREE) for x in length], atol=1e-9)
-        law = CableLaw(**Robot.of(scenario).structure.cable_laws[number])
+        law = Robot.of(scenario).structure.cable_laws[number]
         stretch = np.maximum(length - FREE, 0.0)
         speed = found.v_WN.sel(node=f"m-{name}", axis="z").values
         energy = 0.5 * MASS * speed**2 - MASS * G * length + elastic_energy(stretch, law)
@@ -83,7 +83,7 @@ def test_masses_at_rest_stretch_springs_as_their_data_sheets_say():
 
 @pytest.mark.parametrize("name", SPRINGS)
 def test_energy_and_stretch_of_a_spring_fit_its_tension(name):
-    law = CableLaw(**Robot.of(hung("!Compiled")).structure.cable_laws[[*SPRINGS].index(name)])
+    law = Robot.of(hung("!Compiled")).structure.cable_laws[[*SPRINGS].index(name)]
     x = np.linspace(0.0, 0.05, 5001)[1:]
     tension = np.array([pull(name, each) for each in x])
     np.testing.assert_allclose(elastic_tension(x, law), tension, rtol=1e-12)
@@ -95,8 +95,8 @@ def test_energy_and_stretch_of_a_spring_fit_its_tension(name):
 def test_a_string_without_stiffness_gets_that_of_anchors():
     tree = StructureFile.model_validate(TREES["strung"])
     law = tree.blueprint().cable_laws[0]
-    assert law["stiffness"] == pytest.approx(2.0 * G / (1e-5 * 0.4))  # sags by 1e-5 of its length
-    assert law["damping"] == 1e-3 * law["stiffness"]
+    assert law.stiffness == pytest.approx(2.0 * G / (1e-5 * 0.4))  # sags by 1e-5 of its length
+    assert law.damping == 1e-3 * law.stiffness
 
 
 LINE = {"string": True, "stiffness": 2e4, "damping": 20.0}

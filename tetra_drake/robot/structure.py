@@ -101,8 +101,7 @@ class Structure(Blueprint):
         """Cables with their nodes, signals and constants: records (cables,) of
         laws.cable.cable_type(). Their `signal` is the index of the oscillator that drives the
         cable, or laws.cable.PASSIVE without actuator."""
-        laws = [cable.CableLaw(**law) for law in self.cable_laws]
-        cables = cable.CableLaw.put(laws, *self.cable_ends.T)
+        cables = cable.CableLaw.put(self.cable_laws, *self.cable_ends.T)
         for oscillator, driven in enumerate(self.groups):
             cables["signal"][list(driven)] = oscillator
         return cables

@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -125,8 +125,8 @@ class Blueprint:
     cable_ends: np.ndarray
     """Indices of the two end nodes of each cable (cables, 2). The node of the body with the lower
     index comes first."""
-    cable_laws: tuple[Mapping[str, Any], ...]
-    """Constants of each cable's force law, by the names of laws.cable.CableLaw."""
+    cable_laws: tuple[CableLaw, ...]
+    """Constants of each cable's force law."""
     slack: bool
     """True if cables go slack instead of pushing."""
     contacts: np.ndarray
@@ -288,7 +288,7 @@ class Blueprint:
         """Keys of the cables with friction at their rings, and of the joints with friction."""
         laws = zip(self.cable_keys, self.cable_laws, strict=True)
         joints = itertools.compress(self.joint_keys, self.joint_friction)
-        return [key for key, law in laws if law.get("mu")] + [*joints]
+        return [key for key, law in laws if law.mu] + [*joints]
 
     def check(self) -> None:
         """Raises InputError, naming the key of the robot's settings, if it cannot be simulated."""
@@ -351,7 +351,7 @@ class Blueprint:
         for body, given in self.given_inertia.items():
             mass[body] = mass[body] if given.mass is None else given.mass
         weight = mass.sum() * max(gravity, 9.80665) + np.abs(self.node_load).sum()
-        cables = [HOLDS * law["stiffness"] for law in self.cable_laws]
+        cables = [HOLDS * law.stiffness for law in self.cable_laws]
         firm = max(sum(cables), float(weight) / (SAGS * (self.length or 1.0)))
         return firm, max([STIFFEST * float(mass.min()), *cables])
 
@@ -429,8 +429,7 @@ class Blueprint:
             refuse("cables", f"{problem}, expected all bodies to be joined")
 
         lengths = self.along_cables(self._distances(self.segments.ends))
-        for cable, length in enumerate(lengths):
-            law = CableLaw(**self.cable_laws[cable])
+        for cable, (length, law) in enumerate(zip(lengths, self.cable_laws, strict=True)):
             if law.free_length < 0.0:
                 tension = round(elastic_tension(length - law.free_length, law), 12)
                 most = elastic_tension(length, law._replace(free_length=0.0))

@@ -10,7 +10,6 @@ from typing import TypeVar
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.laws.cable import CableLaw
 from tetra_drake.scenario.blueprint import Blueprint, cable_numbers
 from tetra_drake.scenario.start import Push
 from tetra_drake.settings.quantities import Keyed, Time
@@ -49,7 +48,7 @@ def blueprint_after(blueprint: BlueprintT, events: Sequence[Event]) -> Blueprint
     node_mass, payload = blueprint.node_mass.copy(), blueprint.payload.copy()
     for event in events:
         for cable in (numbers[name] for name in event.cut):
-            laws[cable] = CableLaw(**laws[cable]).cut()._asdict()
+            laws[cable] = laws[cable].cut()
         for name in event.lose:
             of_nodes = name in blueprint.node_names
             masses = node_mass if of_nodes else payload

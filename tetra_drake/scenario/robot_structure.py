@@ -20,12 +20,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from tetra_drake.laws.cable import (
-    CableLaw,
-    Curve,
-    elastic_stretch,
-    elastic_tension,
-)
+from tetra_drake.laws.cable import CableLaw, Curve, elastic_stretch, elastic_tension
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
@@ -223,28 +218,25 @@ class CableGroup(Section):
                 refuse(f"factors.{name}", f"{found}, expected {len(self.pairs)} of a given number")
         return self
 
-    def law(self, distance: float, place: int, *, firm: float = 0.0) -> dict[str, Any]:
-        """Constants (SI) of a cable's force law, by the names of laws.cable.CableLaw. `distance`
-        (m) is the distance of its nodes in the file; it gives the free length for a `tension`.
-        `place` is the cable's index in `pairs`, `firm` (N/m) the stiffness of strings that give
-        none."""
+    def law(self, distance: float, place: int, *, firm: float = 0.0) -> CableLaw:
+        """Constants (SI) of a cable's force law. `distance` (m) is the distance of its nodes in the
+        file; it gives the free length for a `tension`. `place` is the cable's index in `pairs`,
+        `firm` (N/m) the stiffness of strings that give none."""
         own: dict[str, float] = {
             name: values[place] * getattr(self, name) for name, values in self.factors.items()
         }
         group = self.model_copy(update=own) if own else self
-        stiffness, damping, free_length = group.stiffness or firm, group.damping, group.free_length
+        stiffness = group.stiffness or firm
         table = [*zip(self.curve.stretch, self.curve.force, strict=True)] if self.curve else []
         if table:
             stiffness = table[-1][1] / table[-1][0]
         more = {name: getattr(self, name) for name in ("initial_tension", "quadratic", "cubic")}
         curve = Curve.of_spring(stiffness, table=table, **more)
-        law: dict[str, Any] = {"damping": STRING_TIME * stiffness if damping is None else damping}
-        law |= {"stiffness": stiffness} | ({"curve": curve} if curve.pieces else {})
-        law |= {"mu": self.mu} if self.mu else {}
-        if free_length is None:
-            own_law = CableLaw(**law, free_length=distance)
-            free_length = distance - elastic_stretch(group.tension or 0.0, own_law)
-        return law | {"free_length": free_length}
+        damping = STRING_TIME * stiffness if group.damping is None else group.damping
+        law = CableLaw(stiffness, damping, group.free_length or 0.0, mu=self.mu, curve=curve)
+        if group.tension is None:
+            return law
+        return law._replace(free_length=distance - elastic_stretch(group.tension, law))
 
 
 class BallJoint(Section):
@@ -446,7 +438,7 @@ class StructureFile(RobotSettings):
             laws.append(group.law(length, int(place_in_group), firm=firm))
             limits.append(group.max_tension or math.inf)
             if group.max_stretch:
-                most = elastic_tension(group.max_stretch, CableLaw(**laws[-1]))
+                most = elastic_tension(group.max_stretch, laws[-1])
                 limits[-1] = min(limits[-1], most)
             paths.append([number[node] for node in path])
         ends = [[path[0], path[-1]] for path in paths]

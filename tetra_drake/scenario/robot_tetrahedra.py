@@ -75,12 +75,10 @@ class RowCables(Section):
     slack: bool
     """True if cables go slack; otherwise they also push (Eq. 6)."""
 
-    def law(self, cable: str) -> dict[str, float]:
-        """Constants (SI) of the force law of one cable of a junction, such as "outer top", by the
-        names of laws.cable.CableLaw."""
+    def law(self, cable: str) -> CableLaw:
+        """Constants (SI) of the force law of one cable of a junction, such as "outer top"."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
-        free_length, damping = self.free_length, self.damping
-        return {"stiffness": stiffness, "damping": damping, "free_length": free_length}
+        return CableLaw(stiffness, self.damping, self.free_length)
 
 
 Spacing = Annotated[float, *quantity("m", balanced=0.0)]
@@ -201,7 +199,7 @@ class Tetrahedra(RobotSettings):
         deciding = []  # strut length, and all constants of cables at rest
         for robot in (self, base):
             laws = [robot.cables.law(cable) for cable in ("outer top", "inner top")]
-            deciding.append([robot.strut_length, *(law | {"damping": 0.0} for law in laws)])
+            deciding.append([robot.strut_length, *(law._replace(damping=0.0) for law in laws)])
         return {"spacing": "balanced"} if deciding[0] != deciding[1] else {}
 
     @field_validator("spacing")
@@ -219,7 +217,7 @@ class Tetrahedra(RobotSettings):
             return spacing
         strut_length, cables = info.data["strut_length"], info.data["cables"]
         height, radius = strut_length * math.sqrt(2.0 / 3.0), strut_length / math.sqrt(3.0)
-        outer, inner = CableLaw(**cables.law("outer top")), CableLaw(**cables.law("inner top"))
+        outer, inner = cables.law("outer top"), cables.law("inner top")
 
         def pull(s: float) -> float:
             length = math.hypot(radius, height - s)

@@ -433,6 +433,7 @@ def save_predictions(predictions: Predictions, folder: Path) -> None:
         about=f"{predictions.about} {ABOUT}",
         table=predictions.table,
         notes=predictions.notes,
+        unknown="",
         figure=FIGURE,
         caption="intervals, and the share of each tolerance",
         second=predictions.table_of_shares,
