@@ -15,7 +15,7 @@ from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.laws.model import WORLD, carriers_of
 from tetra_drake.scenario.start import Start
-from tetra_drake.settings.refusals import hint, refuse
+from tetra_drake.settings.refusals import check_known, refuse
 
 TOLERANCE = 1e-6
 """Distance below which two points count as the same, as a share of the robot's size."""
@@ -328,8 +328,7 @@ class Blueprint:
                 expected = f"expected none or {bodies}, one for each body"
                 refuse(key, f"found {len(items)} items, {expected}")
         for name in self.start.bodies if self.start else ():
-            if name not in self.bodies:
-                refuse(f"start.bodies.{name}", f"found no such body; {hint(name, self.bodies)}")
+            check_known(f"start.bodies.{name}", "body", name, self.bodies)
 
         lengths, diameters = self._distances(self.struts), 2.0 * self.strut_radius
         masses = math.pi * self.strut_radius**2 * lengths * self.strut_density
@@ -391,16 +390,14 @@ class Blueprint:
     def _check_places(self) -> None:
         """Raises InputError for two nodes at the same position, unless nothing leads to one of
         them."""
-        p_WN, least = self.p_WN, LEAST_DISTANCE * self.shortest
-        is_end = np.isin(np.arange(len(p_WN)), [*self.segments.ends.flat, *self.struts.flat])
-        for node in np.flatnonzero(is_end)[1:].tolist():
-            distances = np.linalg.norm(p_WN[:node] - p_WN[node], axis=1)
-            distances[self.places[:node] == self.places[node]] = np.inf
-            distances[~is_end[:node]] = np.inf
-            if distances.min() < least:
-                problem = f"found the place of '{self.node_names[distances.argmin()]}'"
-                expected = f"expected nodes {least:.3g} m apart"
-                refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
+        ends, least = np.unique([*self.segments.ends, *self.struts]), LEAST_DISTANCE * self.shortest
+        between = self.p_WN[ends] - self.p_WN[ends, np.newaxis]
+        is_near = np.linalg.norm(between, axis=2) < least
+        is_near &= self.places[ends] != self.places[ends, np.newaxis]
+        for first, second in np.argwhere(is_near):
+            problem = f"found the place of '{self.node_names[ends[first]]}'"
+            expected = f"expected nodes {least:.3g} m apart"
+            refuse(f"nodes.{self.node_names[ends[second]]}", f"{problem}, {expected}")
 
     def _check_cables(self) -> None:
         """Raises InputError for cables that do not join two bodies, or a body and the world; for

@@ -30,6 +30,7 @@ from tetra_drake.scenario.structure_graph import (
     Pair,
     components,
     members,
+    nodes_of,
     struts_by_name,
     unused_name,
 )
@@ -51,7 +52,7 @@ from tetra_drake.settings.quantities import (
     Torque,
     quantity,
 )
-from tetra_drake.settings.refusals import described, hint, refuse
+from tetra_drake.settings.refusals import check_known, described, refuse
 from tetra_drake.settings.section import (
     Section,
     Varied,
@@ -574,9 +575,7 @@ class StructureFile(RobotSettings):
         body_of = {part: i for i, body in enumerate(components(welded)) for part in body}
 
         for place, node in enumerate(self.pinned):
-            if node not in self.nodes:
-                found = f"found unknown node '{node}'; {hint(node, self.nodes)}"
-                refuse(f"pinned[{place}]", found)
+            check_known(f"pinned[{place}]", "node", node, self.nodes)
             here: dict[int, list[list[str]]] = {}
             for part, nodes in enumerate(parts):
                 if node in nodes:
@@ -624,19 +623,13 @@ class StructureFile(RobotSettings):
         """Refuses nodes and struts that do not exist."""
         named = [(member.key, node) for member in self._members for node in member.nodes]
         named += [(f"anchors.{node}", node) for node in self.anchors]
-        for kind, entries in (("joints", self.joints), ("bodies", self.bodies)):
-            for name, entry in entries.items():
-                nodes = enumerate(entry.nodes)
-                named += [(f"{kind}.{name}.nodes[{i}]", node) for i, node in nodes]
+        named += [*nodes_of("joints", self.joints), *nodes_of("bodies", self.bodies)]
         for key, node in (*named, *self._named_as_moving):
-            if node not in self.nodes:
-                refuse(key, f"found unknown node '{node}'; {hint(node, self.nodes)}")
+            check_known(key, "node", node, self.nodes)
         struts = struts_by_name(members("struts", self.struts))
         for name, body in self.bodies.items():
             for i, strut in enumerate(body.struts):
-                if strut not in struts:
-                    found = f"found unknown strut '{strut}'; {hint(strut, struts)}"
-                    refuse(f"bodies.{name}.struts[{i}]", found)
+                check_known(f"bodies.{name}.struts[{i}]", "strut", strut, struts)
 
     @property
     def _members(self) -> list[Member]:
@@ -646,8 +639,7 @@ class StructureFile(RobotSettings):
     def _named_as_moving(self) -> list[tuple[str, str]]:
         """Keys and names of the nodes that only a body can have."""
         moving = [(f"masses.{node}", node) for node in self.masses]
-        for name, group in self.spheres.items():
-            moving += [(f"spheres.{name}.nodes[{i}]", node) for i, node in enumerate(group.nodes)]
+        moving += nodes_of("spheres", self.spheres)
         moving += [(f"loads.{node}", node) for node in self.loads]
         if self.contacts != "all":
             moving += [(f"contacts[{i}]", node) for i, node in enumerate(self.contacts)]
@@ -708,8 +700,7 @@ class StructureFile(RobotSettings):
         for oscillator, names in self.actuated.items():
             for i, name in enumerate(names):
                 key = f"actuated.{oscillator}[{i}]"
-                if name not in numbers:
-                    refuse(key, f"found unknown cable '{name}'; {hint(name, numbers)}")
+                check_known(key, "cable", name, numbers)
                 cable = numbers[name]
                 if cable in drivers:
                     found = f"found '{cable_names[cable]}', which '{drivers[cable]}' drives"

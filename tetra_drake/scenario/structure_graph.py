@@ -21,6 +21,13 @@ class HasPairs(Protocol):
     def pairs(self) -> list[list[str]]: ...
 
 
+class HasNodes(Protocol):
+    """Entry of a structure file that lists nodes."""
+
+    @property
+    def nodes(self) -> list[str]: ...
+
+
 class Member(NamedTuple):
     """A strut or a cable of a structure file."""
 
@@ -41,6 +48,14 @@ def members(key: str, groups: Mapping[str, HasPairs]) -> Iterator[Member]:
     for name, group in groups.items():
         for place, nodes in enumerate(group.pairs):
             yield Member(f"{key}.{name}.pairs[{place}]", name, tuple(nodes))
+
+
+def nodes_of(key: str, entries: Mapping[str, HasNodes]) -> Iterator[tuple[str, str]]:
+    """Keys and names of the nodes that the entries of a section list, such as "joints.j.nodes[0]"
+    and "a". `key` is the section."""
+    for name, entry in entries.items():
+        for place, node in enumerate(entry.nodes):
+            yield f"{key}.{name}.nodes[{place}]", node
 
 
 def struts_by_name(struts: Iterable[Member]) -> dict[str, list[Member]]:
