@@ -1,7 +1,6 @@
 """Run directories: what is refused, repaired and reported, and how runs are resumed."""
 
 import json
-import os
 import shutil
 
 import numpy as np
@@ -64,16 +63,6 @@ def test_runs_are_resumed_where_one_is_and_begun_where_none_is(run_small, tmp_pa
     with RunRecord.resume(run, scenario=small_scenario().with_changes({"name": "another"})):
         pass
     assert read_record(run) == before
-
-
-def test_a_pipe_in_place_of_a_file_is_refused_at_once(run_small, refused):
-    run = run_small(trials=1)
-    for name, read in (("trial_00/evaluations.jsonl", load_run), (".lock", RunRecord.resume)):
-        (run / name).rename(run / "aside")
-        os.mkfifo(run / name)
-        with refused(run / name, "", "pipe"):
-            read(run)
-        (run / "aside").replace(run / name)
 
 
 def test_what_a_kill_in_the_first_moment_leaves_is_an_empty_directory(tmp_path):
