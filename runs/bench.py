@@ -29,7 +29,7 @@ import pandas
 from matplotlib.figure import Figure
 from page import rendered
 from records import append, read
-from script import read_settings, run_script
+from script import read_settings, script
 
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate
@@ -344,6 +344,7 @@ def page(records: Sequence[Record]) -> str:
     return rendered("bench.md", **settings, **tables)
 
 
+@script
 def main(files: Sequence[str]) -> None:
     """Runs the entries, and writes the page."""
     entries = [Entry.of(Path(file)) for file in files or sorted(ENTRIES.glob("*.py"))]
@@ -366,7 +367,3 @@ def main(files: Sequence[str]) -> None:
     save_figure(scores_figure(records), HERE, FIGURE, kinds=["svg"])
     write_whole(HERE / INTERVALS, intervals(records))
     write_whole(HERE / PAGE_NAME, page(records))
-
-
-if __name__ == "__main__":
-    run_script(main)

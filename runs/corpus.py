@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from page import rendered
-from script import read_settings, run_script
+from script import read_settings, script
 
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import InputError, SimulationFailure
@@ -167,6 +167,7 @@ def csv(table: pd.DataFrame) -> str:
     return table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
 
 
+@script
 def main(chosen: Sequence[str]) -> None:
     """Measures structures and writes the page after each."""
     rows = json.loads(MEASURED.read_text(encoding="utf-8")) if MEASURED.exists() else {}
@@ -179,7 +180,3 @@ def main(chosen: Sequence[str]) -> None:
         write_whole(FOLDER / "structures.csv", csv(structures))
         write_whole(FOLDER / "known.csv", csv(known))
         write_whole(PAGE, page(structures, known))
-
-
-if __name__ == "__main__":
-    run_script(main)

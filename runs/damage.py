@@ -23,7 +23,7 @@ import pandas
 from matplotlib.figure import Figure
 from page import rendered
 from records import append, read
-from script import read_settings, run_script
+from script import read_settings, script
 
 from tetra_drake.engines.simulate import Outcome, simulate, simulate_many
 from tetra_drake.evolution.run import load_run
@@ -342,6 +342,7 @@ def page(walks: Sequence[Row], plan_rows: Sequence[Row], candidates: Sequence[Ro
     return rendered("damage.md", **tables, plans=planned(plan_rows), steady=steady)
 
 
+@script
 def main(_: Sequence[str] = ()) -> None:
     """Records what is missing, and writes the page and its figure."""
     find_gaits()
@@ -352,7 +353,3 @@ def main(_: Sequence[str] = ()) -> None:
     figure = speed_figure(outcomes(walks), planned(plan_rows))
     save_figure(figure, HERE, "speed", kinds=["svg"])
     write_whole(HERE / "README.md", page(walks, plan_rows, read(CANDIDATES)))
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -33,7 +33,7 @@ from measured_robots import (
     spine_poses,
 )
 from page import percent, rendered
-from script import run_script
+from script import script
 
 from tetra_drake.figures.style import (
     LINE_COLOURS,
@@ -251,6 +251,7 @@ def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> 
     )
 
 
+@script
 def main(_: Sequence[str] = ()) -> None:
     """Writes the page, the numbers of simulations and the pictures."""
     rows, under_load, poses = measured_rows(), simplex_under_load(), spine_poses()
@@ -269,7 +270,3 @@ def main(_: Sequence[str] = ()) -> None:
     write_whole(HERE / NUMBERS, json.dumps(simulated, indent=1) + "\n")
     write_whole(HERE / INTERVALS, table(rows["known"]))
     write_whole(HERE / "README.md", page(simulated, rows))
-
-
-if __name__ == "__main__":
-    run_script(main)

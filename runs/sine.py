@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from script import measured, run_script
+from script import measured, script
 
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.evolution.run import Run, load_run
@@ -97,6 +97,7 @@ def farthest(run: Run) -> dict[str, float]:
     }
 
 
+@script
 def main(names: Sequence[str]) -> None:
     """Writes the record and prints it."""
     found = load_sines()
@@ -104,7 +105,3 @@ def main(names: Sequence[str]) -> None:
         found[name] = farthest(load_run(HERE / name))
         write_whole(RECORD, json.dumps(found, indent=1) + "\n")
         print(name, found[name], flush=True)
-
-
-if __name__ == "__main__":
-    run_script(main)
