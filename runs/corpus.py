@@ -42,17 +42,10 @@ FOLDER = Path(__file__).parents[1] / "tests" / "data" / "corpus"
 MEASURED, KNOWN, PAGE = FOLDER / "measured.json", FOLDER / "known.yaml", FOLDER / "README.md"
 ENGINES = {"compiled": Compiled(), "drake": Drake(), "mujoco": Mujoco()}
 SECONDS = {"simulation.duration": 1.0, "simulation.steady_from": 0.5}
-SIZES = {
-    "bodies": "bodies",
-    "cables": "cables",
-    "mass": "mass (kg)",
-    "frequency": "lowest frequency (Hz)",
-    "speed": "speed (times real time)",
-}
-"""Numbers of a structure on the page, with their headings."""
+SIZES, OTHERS = read_settings(Path(__file__).with_suffix(".yaml")).values()
+"""Numbers of a structure on the page, and those in the table alone, with their headings."""
 MOVES = {engine: f"moves on {engine} (m)" for engine in ENGINES}
-COLUMNS = SIZES | {"states": "self-stress states", "mechanisms": "mechanisms"} | MOVES
-"""Numbers of a structure in the table, with their headings."""
+"""Headings of the greatest ways at rest."""
 
 
 def names() -> list[str]:
@@ -149,7 +142,7 @@ def tables(rows: dict[str, dict[str, Any]]) -> tuple[pd.DataFrame, pd.DataFrame]
         source = re.search(r"^# source: (.*(?:\n#   .*)*)", text, re.MULTILINE)
         about = text.splitlines()[0].removeprefix("# ")
         by = (source[1] if source else "").replace("\n#   ", " ")
-        numbers = {heading: row[key] for key, heading in COLUMNS.items()}
+        numbers = {heading: row[key] for key, heading in (SIZES | OTHERS | MOVES).items()}
         structures.append({"structure": name, "what it is": about, "source": by} | numbers)
         known += [[name, *one] for one in row["known"]]
     columns = ["structure", "quantity", "known", "ours", "by"]

@@ -188,17 +188,15 @@ def measured_rows() -> dict[str, pandas.DataFrame]:
     spine = found["spine"]
     found["spine"] = spine[~spine["quantity"].isin(blind["quantity"])]
     anew = pandas.concat([rows for name, rows in found.items() if name.startswith("anew_")])
-    known = pandas.concat([rows for name, rows in found.items() if name in KNOWN])
+    known = pandas.concat(
+        [rows for name, rows in found.items() if not name.startswith(("anew_", "blind_"))]
+    )
     rows = {**found, "known": known, "blind": blind, "anew": anew}
     rows = {name: each.dropna(subset="measured") for name, each in rows.items()}
     return {
         name: each.reset_index(drop=True).assign(inside=holds(each).to_numpy())
         for name, each in rows.items()
     }
-
-
-KNOWN = ("simplex_loads", "simplex_frequencies", "spine", "jumps")
-"""Cases whose measured values were known when they were first predicted."""
 
 
 def of_simulations(
