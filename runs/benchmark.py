@@ -34,7 +34,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import GetIntegrationSchemes, ResetIntegratorFromFlags, Simulator
-from script import chosen, read_settings, run_script
+from script import chosen, read_settings, script
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.mjcf import make_mjcf
@@ -374,11 +374,8 @@ USUAL = [*TABLES][:3]
 """Tables that are printed without names."""
 
 
+@script
 def main(names: Sequence[str], scenario: Scenario | None = None) -> None:
     """Prints the tables of the given names, or the USUAL ones. Raises InputError."""
     for name in chosen(names or USUAL, TABLES, "TABLE"):
         print(f"{TABLES[name](scenario or load_scenario('thesis')).markdown()}\n", flush=True)
-
-
-if __name__ == "__main__":
-    run_script(main)

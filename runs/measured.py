@@ -33,7 +33,7 @@ from measured_robots import (
     spine_poses,
 )
 from page import percent, rendered
-from script import run_script
+from script import script
 
 from tetra_drake.figures.style import (
     LINE_COLOURS,
@@ -188,17 +188,15 @@ def measured_rows() -> dict[str, pandas.DataFrame]:
     spine = found["spine"]
     found["spine"] = spine[~spine["quantity"].isin(blind["quantity"])]
     anew = pandas.concat([rows for name, rows in found.items() if name.startswith("anew_")])
-    known = pandas.concat([rows for name, rows in found.items() if name in KNOWN])
+    known = pandas.concat(
+        [rows for name, rows in found.items() if not name.startswith(("anew_", "blind_"))]
+    )
     rows = {**found, "known": known, "blind": blind, "anew": anew}
     rows = {name: each.dropna(subset="measured") for name, each in rows.items()}
     return {
         name: each.reset_index(drop=True).assign(inside=holds(each).to_numpy())
         for name, each in rows.items()
     }
-
-
-KNOWN = ("simplex_loads", "simplex_frequencies", "spine", "jumps")
-"""Cases whose measured values were known when they were first predicted."""
 
 
 def of_simulations(
@@ -251,6 +249,7 @@ def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> 
     )
 
 
+@script
 def main(_: Sequence[str] = ()) -> None:
     """Writes the page, the numbers of simulations and the pictures."""
     rows, under_load, poses = measured_rows(), simplex_under_load(), spine_poses()
@@ -269,7 +268,3 @@ def main(_: Sequence[str] = ()) -> None:
     write_whole(HERE / NUMBERS, json.dumps(simulated, indent=1) + "\n")
     write_whole(HERE / INTERVALS, table(rows["known"]))
     write_whole(HERE / "README.md", page(simulated, rows))
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -240,7 +240,7 @@ def loads_measured(file: str, loads: Sequence[float], means: bool, **_: Any) -> 
     """Measured heights and forces of the simplex under loads; see simplex_tests()."""
     steps, found = load_steps(file), Values()
     for load in loads:
-        _, nearest = min(steps, key=lambda step: abs(step[0] - load))
+        nearest = min(steps, key=lambda step: abs(step[0] - load))[1]
         values = nearest.groupby("kind" if means else "element")["value"].mean()
         found |= {f"{name} at {load:.2f} kN": value for name, value in values.items()}
     return found

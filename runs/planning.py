@@ -38,7 +38,7 @@ from planning_page import (
 )
 from records import append
 from scipy.ndimage import generate_binary_structure, map_coordinates, minimum_filter
-from script import chosen, evolved, run_script
+from script import chosen, evolved, script
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.planner import Planner
@@ -298,6 +298,7 @@ def run_all(episodes: Sequence[Episode], folder: Path) -> None:
         print(f"{episode.group}, {episode.name}: {done}, {record['time']:.1f} s, {cost:.2f} s CPU")
 
 
+@script
 def main(groups: Sequence[str], folder: Path = HERE) -> None:
     """Runs the episodes of groups, or all, films the slalom, and writes the page. Raises
     InputError."""
@@ -307,7 +308,3 @@ def main(groups: Sequence[str], folder: Path = HERE) -> None:
         (slalom,) = (each for each in episodes if each.name == "slalom")
         film(run_episode(slalom)[1], slalom.pillars, folder / FILM)
     write_page(folder, episodes)
-
-
-if __name__ == "__main__":
-    run_script(main)
