@@ -24,7 +24,6 @@ from tetra_drake.laws.cable import CableLaw, Curve, elastic_stretch, elastic_ten
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
-from tetra_drake.scenario.start import Start
 from tetra_drake.scenario.structure_graph import (
     Member,
     Pair,
@@ -34,11 +33,10 @@ from tetra_drake.scenario.structure_graph import (
     struts_by_name,
     unused_name,
 )
-from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
+from tetra_drake.scenario.tolerances import check_tolerances
 from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.quantities import (
     THREE,
-    Acceleration,
     Damping,
     Density,
     ForceQuantity,
@@ -46,7 +44,6 @@ from tetra_drake.settings.quantities import (
     Keyed,
     Length,
     Mass,
-    Position,
     Stiffness,
     Time,
     Torque,
@@ -335,17 +332,8 @@ class StructureFile(RobotSettings):
     """Ratio of damping to stiffness of an anchor; as for joints."""
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
-    gravity: Acceleration = Field(default=9.80665, ge=0)
-    """Acceleration of gravity."""
-    offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0, but for the axes of its anchors."""
-    start: Start | None = Field(default=None, exclude_if=operator.not_)
-    """How the robot is turned and moves at t = 0; at rest if there is none."""
     ignored: list[str] | None = None
     """Settings of an imported file that have no effect, such as friction."""
-    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key: `cables.side.stiffness: 2 %`, `nodes: 1 mm`; also
-    in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.
@@ -715,15 +703,6 @@ class ParametricRobot(RobotSettings):
     made."""
 
     unit: ClassVar[None] = None
-
-    gravity: Acceleration = Field(default=9.80665, ge=0)
-    """Acceleration of gravity."""
-    offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0; none if empty."""
-    start: Start | None = Field(default=None, exclude_if=operator.not_)
-    """How the robot is turned and moves at t = 0; at rest if there is none."""
-    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key."""
 
     def structure(self) -> StructureFile:
         """The structure for these settings. Its gravity and tolerances are not used."""
