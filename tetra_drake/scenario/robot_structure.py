@@ -217,7 +217,7 @@ class CableGroup(Section):
                 refuse(f"factors.{name}", f"{found}, expected {len(self.pairs)} of a given number")
         return self
 
-    def law(self, distance: float, place: int, *, firm: float = 0.0) -> CableLaw:
+    def law(self, distance: float, place: int, *, firm: float) -> CableLaw:
         """Constants (SI) of a cable's force law. `distance` (m) is the distance of its nodes in the
         file; it gives the free length for a `tension`. `place` is the cable's index in `pairs`,
         `firm` (N/m) the stiffness of strings that give none."""
@@ -342,6 +342,15 @@ class StructureFile(RobotSettings):
         struts, and other nodes with a mass or a sphere. Cables are in the order of the pairs of
         bodies, those from fixed nodes first. Cables that run over rings come after all others.
         """
+        blueprint = self._blueprint(firm=0.0)
+        is_firm = any(group.string and not group.stiffness for group in self.cables.values())
+        if not (self.joints or self.anchors or is_firm):
+            return blueprint
+        return self._blueprint(firm=min(blueprint.firm_stiffness(self.gravity)))
+
+    def _blueprint(self, *, firm: float) -> Blueprint:
+        """The blueprint, with the stiffness `firm` (N/m) of anchors, joints and strings that give
+        none."""
         bodies, joined = self._nodes_of_bodies(), self._nodes_of_joined()
         first_node = np.append(0, np.cumsum([len(nodes) for nodes in bodies]))
         body_of = {node: body for body, nodes in enumerate(bodies) for node in nodes}
@@ -355,10 +364,10 @@ class StructureFile(RobotSettings):
         struts = sorted(members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
         makes = [self.struts[strut.group] for strut in struts]
         ends = [[number[node] for node in strut.nodes] for strut in struts]
-        cables = self._cables_of(number, body_of)
+        cables, anchors = self._cables_of(number, body_of, firm), self.anchor_stiffness or firm
         numbers = cable_numbers(cables["cable_names"])
 
-        blueprint = Blueprint(
+        return Blueprint(
             bodies=self._names_of_bodies(bodies, nodes),
             node_names=nodes,
             first_node=first_node,
@@ -372,13 +381,13 @@ class StructureFile(RobotSettings):
             **self._spheres(number, held),
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
-            anchor_stiffness=held.astype(float),  # per stiffness, as joints
-            anchor_damping=self.anchor_time_constant * held,
+            anchor_stiffness=anchors * held,
+            anchor_damping=anchors * (self.anchor_time_constant * held),
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
             start=self.start,
             **cables,
-            **self._joints_of(number, body_of),
+            **self._joints_of(number, body_of, firm),
             given_inertia={
                 body_of[joined[key][0]]: body.given for key, body in self.bodies.items()
             },
@@ -390,23 +399,9 @@ class StructureFile(RobotSettings):
                 for names in self.actuated.values()
             ),
         )
-        is_firm = any(group.string and not group.stiffness for group in self.cables.values())
-        if not (self.joints or held.any() or is_firm):
-            return blueprint
-        firm = min(blueprint.firm_stiffness(self.gravity))
-        anchors, of_joints = self.anchor_stiffness or firm, self.joint_stiffness or firm
-        joints = np.array([joint.stiffness or of_joints for joint in self.joints.values()])
-        return dataclasses.replace(
-            blueprint,
-            **self._cables_of(number, body_of, firm=firm),
-            anchor_stiffness=anchors * blueprint.anchor_stiffness,
-            anchor_damping=anchors * blueprint.anchor_damping,
-            joint_stiffness=joints,
-            joint_damping=joints * blueprint.joint_damping,
-        )
 
     def _cables_of(
-        self, number: Mapping[str, int], body_of: Mapping[str, int], *, firm: float = 0.0
+        self, number: Mapping[str, int], body_of: Mapping[str, int], firm: float
     ) -> dict[str, Any]:
         """Fields of the blueprint for the cables, each from the body with the lower index. Cables
         within a body of `bodies` are left out. `number` and `body_of` have the index of each node
@@ -443,16 +438,21 @@ class StructureFile(RobotSettings):
             "cable_rings": {i: tuple(path[1:-1]) for i, path in enumerate(paths) if len(path) > 2},
         }
 
-    def _joints_of(self, number: Mapping[str, int], body_of: Mapping[str, int]) -> dict[str, Any]:
+    def _joints_of(
+        self, number: Mapping[str, int], body_of: Mapping[str, int], firm: float
+    ) -> dict[str, Any]:
         """Fields of the blueprint for the joints, each from the body with the lower index. `number`
-        and `body_of` have the index of each node and of its body."""
-        joints = self.joints.values()
+        and `body_of` have the index of each node and of its body. `firm` (N/m) is the stiffness of
+        joints that give none."""
+        joints, usual = self.joints.values(), self.joint_stiffness or firm
+        stiffness = np.array([joint.stiffness or usual for joint in joints])
         ends = [sorted(joint.nodes, key=body_of.__getitem__) for joint in joints]
         pairs = [[number[first], number[second]] for first, second in ends]
         return {
             "joints": np.array(pairs, dtype=int).reshape(-1, 2),
             "joint_keys": tuple(f"joints.{name}" for name in self.joints),
-            "joint_damping": np.array([joint.time_constant for joint in joints]),
+            "joint_stiffness": stiffness,
+            "joint_damping": stiffness * [joint.time_constant for joint in joints],
             "joint_friction": np.array([joint.friction for joint in joints]),
         }
 
