@@ -88,8 +88,8 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
         values["terrain.seed"] = draw.terrain_seed
     if draw.sensing_seed is not None and scenario.sensing is not None:
         values["sensing.seed"] = draw.sensing_seed
-    events = [*scenario.events, *draw.events]
-    return scenario.with_numbers(values).with_sections(events=events, disturbances=None)
+    changed = scenario.with_numbers(values)
+    return changed.with_sections(events=[*changed.events, *draw.events], disturbances=None)
 
 
 def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:

@@ -24,7 +24,6 @@ from tetra_drake.laws.cable import CableLaw, Curve, elastic_stretch, elastic_ten
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
-from tetra_drake.scenario.start import Start
 from tetra_drake.scenario.structure_graph import (
     Member,
     Pair,
@@ -34,11 +33,10 @@ from tetra_drake.scenario.structure_graph import (
     struts_by_name,
     unused_name,
 )
-from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
+from tetra_drake.scenario.tolerances import check_tolerances
 from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.quantities import (
     THREE,
-    Acceleration,
     Damping,
     Density,
     ForceQuantity,
@@ -46,7 +44,6 @@ from tetra_drake.settings.quantities import (
     Keyed,
     Length,
     Mass,
-    Position,
     Stiffness,
     Time,
     Torque,
@@ -219,7 +216,7 @@ class CableGroup(Section):
                 refuse(f"factors.{name}", f"{found}, expected {len(self.pairs)} of a given number")
         return self
 
-    def law(self, distance: float, place: int, *, firm: float = 0.0) -> CableLaw:
+    def law(self, distance: float, place: int, *, firm: float) -> CableLaw:
         """Constants (SI) of a cable's force law. `distance` (m) is the distance of its nodes in the
         file; it gives the free length for a `tension`. `place` is the cable's index in `pairs`,
         `firm` (N/m) the stiffness of strings that give none."""
@@ -333,17 +330,8 @@ class StructureFile(RobotSettings):
     """Ratio of damping to stiffness of an anchor; as for joints."""
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
-    gravity: Acceleration = Field(default=9.80665, ge=0)
-    """Acceleration of gravity."""
-    offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0, but for the axes of its anchors."""
-    start: Start | None = Field(default=None, exclude_if=operator.not_)
-    """How the robot is turned and moves at t = 0; at rest if there is none."""
     ignored: list[str] | None = None
     """Settings of an imported file that have no effect, such as friction."""
-    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key: `cables.side.stiffness: 2 %`, `nodes: 1 mm`; also
-    in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.
@@ -352,6 +340,15 @@ class StructureFile(RobotSettings):
         struts, and other nodes with a mass or a sphere. Cables are in the order of the pairs of
         bodies, those from fixed nodes first. Cables that run over rings come after all others.
         """
+        blueprint = self._blueprint(firm=0.0)
+        is_firm = any(group.string and not group.stiffness for group in self.cables.values())
+        if not (self.joints or self.anchors or is_firm):
+            return blueprint
+        return self._blueprint(firm=min(blueprint.firm_stiffness(self.gravity)))
+
+    def _blueprint(self, *, firm: float) -> Blueprint:
+        """The blueprint, with the stiffness `firm` (N/m) of anchors, joints and strings that give
+        none."""
         bodies, joined = self._nodes_of_bodies(), self._nodes_of_joined()
         first_node = np.append(0, np.cumsum([len(nodes) for nodes in bodies]))
         body_of = {node: body for body, nodes in enumerate(bodies) for node in nodes}
@@ -365,10 +362,10 @@ class StructureFile(RobotSettings):
         struts = sorted(members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
         makes = [self.struts[strut.group] for strut in struts]
         ends = [[number[node] for node in strut.nodes] for strut in struts]
-        cables = self._cables_of(number, body_of)
+        cables, anchors = self._cables_of(number, body_of, firm), self.anchor_stiffness or firm
         numbers = cable_numbers(cables["cable_names"])
 
-        blueprint = Blueprint(
+        return Blueprint(
             bodies=self._names_of_bodies(bodies, nodes),
             node_names=nodes,
             first_node=first_node,
@@ -382,13 +379,13 @@ class StructureFile(RobotSettings):
             **self._spheres(number, held),
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
-            anchor_stiffness=held.astype(float),  # per stiffness, as joints
-            anchor_damping=self.anchor_time_constant * held,
+            anchor_stiffness=anchors * held,
+            anchor_damping=anchors * (self.anchor_time_constant * held),
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
             start=self.start,
             **cables,
-            **self._joints_of(number, body_of),
+            **self._joints_of(number, body_of, firm),
             given_inertia={
                 body_of[joined[key][0]]: body.given for key, body in self.bodies.items()
             },
@@ -400,23 +397,9 @@ class StructureFile(RobotSettings):
                 for names in self.actuated.values()
             ),
         )
-        is_firm = any(group.string and not group.stiffness for group in self.cables.values())
-        if not (self.joints or held.any() or is_firm):
-            return blueprint
-        firm = min(blueprint.firm_stiffness(self.gravity))
-        anchors, of_joints = self.anchor_stiffness or firm, self.joint_stiffness or firm
-        joints = np.array([joint.stiffness or of_joints for joint in self.joints.values()])
-        return dataclasses.replace(
-            blueprint,
-            **self._cables_of(number, body_of, firm=firm),
-            anchor_stiffness=anchors * blueprint.anchor_stiffness,
-            anchor_damping=anchors * blueprint.anchor_damping,
-            joint_stiffness=joints,
-            joint_damping=joints * blueprint.joint_damping,
-        )
 
     def _cables_of(
-        self, number: Mapping[str, int], body_of: Mapping[str, int], *, firm: float = 0.0
+        self, number: Mapping[str, int], body_of: Mapping[str, int], firm: float
     ) -> dict[str, Any]:
         """Fields of the blueprint for the cables, each from the body with the lower index. Cables
         within a body of `bodies` are left out. `number` and `body_of` have the index of each node
@@ -453,16 +436,21 @@ class StructureFile(RobotSettings):
             "cable_rings": {i: tuple(path[1:-1]) for i, path in enumerate(paths) if len(path) > 2},
         }
 
-    def _joints_of(self, number: Mapping[str, int], body_of: Mapping[str, int]) -> dict[str, Any]:
+    def _joints_of(
+        self, number: Mapping[str, int], body_of: Mapping[str, int], firm: float
+    ) -> dict[str, Any]:
         """Fields of the blueprint for the joints, each from the body with the lower index. `number`
-        and `body_of` have the index of each node and of its body."""
-        joints = self.joints.values()
+        and `body_of` have the index of each node and of its body. `firm` (N/m) is the stiffness of
+        joints that give none."""
+        joints, usual = self.joints.values(), self.joint_stiffness or firm
+        stiffness = np.array([joint.stiffness or usual for joint in joints])
         ends = [sorted(joint.nodes, key=body_of.__getitem__) for joint in joints]
         pairs = [[number[first], number[second]] for first, second in ends]
         return {
             "joints": np.array(pairs, dtype=int).reshape(-1, 2),
             "joint_keys": tuple(f"joints.{name}" for name in self.joints),
-            "joint_damping": np.array([joint.time_constant for joint in joints]),
+            "joint_stiffness": stiffness,
+            "joint_damping": stiffness * [joint.time_constant for joint in joints],
             "joint_friction": np.array([joint.friction for joint in joints]),
         }
 
@@ -713,15 +701,6 @@ class ParametricRobot(RobotSettings):
     made."""
 
     unit: ClassVar[None] = None
-
-    gravity: Acceleration = Field(default=9.80665, ge=0)
-    """Acceleration of gravity."""
-    offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0; none if empty."""
-    start: Start | None = Field(default=None, exclude_if=operator.not_)
-    """How the robot is turned and moves at t = 0; at rest if there is none."""
-    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key."""
 
     def structure(self) -> StructureFile:
         """The structure for these settings. Its gravity and tolerances are not used."""
