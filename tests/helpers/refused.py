@@ -43,7 +43,7 @@ from tetra_drake.laws.actuator import Winch
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.contact import MODE_COLUMNS, GroundSection, NormalForce
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.laws.terrain import Flat
+from tetra_drake.laws.terrain import Flat, Grid, Relief
 from tetra_drake.robot.command import Command, controlled_robot, driven_robot
 from tetra_drake.robot.ground import make_surface
 from tetra_drake.robot.robot import Robot
@@ -82,6 +82,16 @@ def answered(answer: Any = None, bounds: tuple[float, float] = (0.0, 1.0)):
     Given.answer, Given.bounds = answer, bounds
     chosen = brief("prism", {}).with_sections(policy=Given())
     simulate(chosen, td.seeded_gait(chosen))
+
+
+def gridded(heights: Any, cell: tuple[float, float] = (1.0, 1.0)):
+    """A robot on a terrain of a plug-in that has these heights."""
+
+    class Odd(Relief):
+        def grid(self, **_: Any) -> Grid:
+            return Grid(heights, (-1.0, -1.0), cell)
+
+    Robot.of(scenario("prism").with_sections(terrain=Odd()))
 
 
 def steered(steering: Any):
