@@ -258,15 +258,11 @@ def diagram(parameters: bool):
 def put(name: str, constants: Any, *, into: str = "", parameters: bool = True):
     """Gives a system constants, in its context or in that of another system; "root" and "none"."""
     own = diagram(parameters)
-    root, system = own.CreateDefaultContext(), own.GetSubsystemByName(name)
-    place = into or name
-    contexts = {"none": None, "root": root}
-    context = (
-        contexts[place]
-        if place in contexts
-        else own.GetSubsystemByName(place).GetMyMutableContextFromRoot(root)
-    )
-    (system.SetLaw if name == "cables" else system.SetGround)(context, constants)
+    root = own.CreateDefaultContext()
+    parts: dict[str, Any] = {"none": None, "root": root}
+    cables, ground = (own.GetSubsystemByName(part) for part in ("cables", "ground"))
+    parts |= {part.get_name(): part.GetMyMutableContextFromRoot(root) for part in (cables, ground)}
+    (cables.SetLaw if name == "cables" else ground.SetGround)(parts[into or name], constants)
 
 
 def with_controller(inputs: dict[str, int], outputs: dict[str, int]):

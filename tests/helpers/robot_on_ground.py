@@ -4,7 +4,7 @@ import numpy as np
 
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
-from tetra_drake.laws.forces import Forces, add_ground_forces, move_contacts
+from tetra_drake.laws.forces import Forces, move_contacts
 from tetra_drake.laws.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
@@ -45,14 +45,6 @@ class RobotOnGround:
 
     def update(self, v=REST, p=TOUCHING) -> bool:
         return self.update_at(self.state(v, p))
-
-    def forces(self, v=REST, p=TOUCHING) -> tuple[np.ndarray, np.ndarray]:
-        """The nodes with the forces on them, and the `ground_forces`."""
-        state = self.state(v, p)
-        forces = self.meet(state)
-        forces.ground_forces[:] = np.nan
-        add_ground_forces(self.model, state, self.modes, True, forces)
-        return forces.nodes, forces.ground_forces
 
     def time_to_change(self, v=REST, a=REST, p=TOUCHING) -> float:
         """Time (s) until the next mode change at an acceleration a (m/s²), at most 9 s."""
