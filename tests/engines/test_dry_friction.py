@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.mjcf import loose_remark, make_mjcf
 from tetra_drake.laws.actuator import Winch
-from tetra_drake.laws.cable import LENGTH, TENSION, CableLaw, elastic_energy
+from tetra_drake.laws.cable import LENGTH, TENSION, elastic_energy
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.dry_friction import CREEP
 from tetra_drake.laws.forces import forces_of_motion
@@ -74,7 +74,7 @@ def test_a_bead_with_friction_moves_as_an_independent_simulation_and_only_loses_
     x, z, *_ = solve_ivp(bead, (0.0, 0.3), start, **exact).y
     p = found.p_WN.sel(node="p", axis=["x", "z"]).values.T
     np.testing.assert_allclose(p, [x, 1.0 + z], atol=5e-5)  # found: 2e-6, by !Drake 2.4e-5
-    law = CableLaw(**robot.structure.cable_laws[0])
+    law = robot.structure.cable_laws[0]
     stretch = found.length.values[:, 0] - law.free_length
     square = (found.v_WN.sel(node="p") ** 2).sum("axis").values
     energy = 0.5 * LIGHT * square + elastic_energy(np.maximum(stretch, 0.0), law)

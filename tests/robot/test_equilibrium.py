@@ -59,7 +59,7 @@ def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
     assert rest.feet
 
 
-@pytest.mark.parametrize(("work", "steps"), [(2.5 * 28365, 2), (0.0, 1)])  # 5 bodies
+@pytest.mark.parametrize(("work", "steps"), [(2.5 * 6981, 2), (0.0, 1)])  # 5 bodies
 def test_a_search_ends_after_steps_by_the_robot_alone(robot, refused, monkeypatch, work, steps):
     monkeypatch.setattr(equilibrium, "MOST_WORK", work)
     monkeypatch.setattr(equilibrium, "LEAST_STEPS", 1)

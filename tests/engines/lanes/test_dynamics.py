@@ -7,7 +7,6 @@ from helpers.kernels import Stepper
 from helpers.states import disturbed, mass_matrix
 
 from tetra_drake.engines.lanes.dynamics import Solver
-from tetra_drake.engines.lanes.sparse import BLOCK
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.forces import Forces
@@ -15,6 +14,7 @@ from tetra_drake.laws.friction import Coulomb, ResetIntegrator
 from tetra_drake.laws.kinematics import move_bodies
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Model
+from tetra_drake.laws.sparse import BLOCK
 from tetra_drake.laws.terrain import Flat, Rough
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario

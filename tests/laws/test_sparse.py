@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.kernels import written_out
 
-from tetra_drake.engines.lanes.sparse import BLOCK, Schedule, factorise, solve
+from tetra_drake.laws.sparse import BLOCK, Schedule, factorise, solve
 
 GRAPHS = {
     "one body": (1, []),
