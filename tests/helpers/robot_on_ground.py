@@ -50,7 +50,8 @@ class RobotOnGround:
     def is_due_at(self, state: np.ndarray) -> bool:
         """True if a mode changes at once when a step ends here."""
         kept = self.modes.copy()
-        due, self.modes[:] = self.update_at(state), kept
+        due = self.update_at(state)
+        self.modes[:] = kept
         return due
 
     def is_due(self, v=REST, p=TOUCHING) -> bool:
