@@ -481,7 +481,7 @@ def damping_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
             anchors=model.anchors._replace(stiffness=model.anchors.damping),
             joints=model.joints._replace(stiffness=model.joints.damping),
             loads=model.loads._replace(forces=np.zeros_like(model.loads.forces)),
-            ground=Ground.nowhere(),
+            ground=Ground(),
             strut_contact=model.strut_contact._replace(acts=False),
             slack=False,
         )

@@ -114,9 +114,9 @@ class StrutGroup(Section):
     sphere's, else the strut's; 0 where an anchor holds along z."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
     """Axial force per shortening, E A / l; none for rigid struts. Without load a strut is as long
-    as in the file. Its stiffness counts in equilibrium and in natural frequencies, the inertia of
-    its elongation does not: the first two frequencies are 0.75 % too high at most if it is 17 times
-    as stiff as its cable, 12 % if as stiff. In motion it keeps its length."""
+    as in the file. It counts at rest and in frequencies, without the inertia of elongation: the
+    first two frequencies are at most 0.75 % too high if it is 17 times as stiff as its cable, 12 %
+    if as stiff. In motion a strut is rigid."""
 
 
 class SphereGroup(Section):
@@ -130,8 +130,7 @@ class SphereGroup(Section):
     density: Density = Field(ge=0)
     """Density of a sphere; 0 only where other parts of the body have mass."""
     contact_radius: Length | None = Field(default=None, ge=0)
-    """Radius with which a sphere touches the ground. By default its own; 0 where an anchor holds
-    along z."""
+    """Radius that touches the ground; by default its own, or 0 where an anchor holds along z."""
 
 
 class CurveTable(Section):
@@ -157,22 +156,22 @@ class CableGroup(Section):
     """Cables, springs or strings with the same constants. They never push."""
 
     damping: Damping | None = Field(default=None, ge=0)
-    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
-    default is 1 ms times its stiffness."""
+    """Damping of a cable: tension per rate of its length. For a string the default is 1 ms times
+    its stiffness."""
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
     """The nodes of each cable. [a, b, c] runs over a ring at b."""
     mu: float = Field(default=0.0, ge=0, le=2, exclude_if=operator.not_)
     """Coefficient of friction at rings: over an angle theta, tensions have the ratio exp(mu theta)
-    in slip. Then the law's tension, which is shown, is the mean along the cable. What friction
-    holds creeps, with up to about 1 mm/s. A winch is at the last node of its path."""
+    in slip. The tension that is shown is the mean along the cable. What friction holds creeps, up
+    to about 1 mm/s. A winch is at the path's last node."""
     stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
     """Tension per elongation. Only a string or a curve needs none."""
     string: bool = Field(default=False, exclude_if=operator.not_)
     """True for strings, which hardly stretch. Without a stiffness they get the default of
     `anchor_stiffness`."""
     initial_tension: ForceQuantity = Field(default=0.0, ge=0, exclude_if=operator.not_)
-    """Tension F0 of a coil spring from which on its coils part: T = F0 + k x. Below it, they are
-    1000 times as stiff."""
+    """Tension F0 from which on the coils of a spring part: T = F0 + k x. Below, they are 1000 times
+    as stiff."""
     quadratic: Annotated[float, *quantity("N/m^2")] = Field(
         default=0.0, ge=0, exclude_if=operator.not_
     )
@@ -260,7 +259,7 @@ class JoinedBody(Section):
     nodes: list[str] = Field(default=[])
     """Further nodes of the body, which need no strut."""
     mass: Mass | None = Field(default=None, gt=0)
-    """Mass of the whole body, in place of the masses of its parts."""
+    """Mass of the whole body, in place of its parts'."""
     centre: Coordinates | None = None
     """Centre of mass [x, y, z] where the nodes are as in the file."""
     inertia: Annotated[list[InertiaQuantity], Field(min_length=3, max_length=6)] | None = None
@@ -313,7 +312,7 @@ class StructureFile(RobotSettings):
     """Nodes at which ball joints hold struts together; elsewhere struts that share a node are one
     body. Each body but the first gets a copy, n-2, and a joint of this name."""
     joint_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness of pinned nodes, and of joints that give none; by default as for anchors."""
+    """Stiffness of pinned nodes and of joints without one; by default as for anchors."""
     bodies: Keyed[Name, JoinedBody] = Field(default={})
     actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Cables of each oscillator, such as side a b, nodes in either order."""
@@ -326,8 +325,7 @@ class StructureFile(RobotSettings):
     """Axes along which the world holds nodes, such as xyz; nodes of struts by a spring and a
     damper."""
     anchor_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness of the anchor of a strut's node, along each axis. By default it follows from cables
-    and weight: see FORMAT.md."""
+    """Stiffness of anchors along each axis; by default from cables and weight, see FORMAT.md."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness of an anchor; as for joints."""
     contacts: Literal["all"] | list[str] = "all"

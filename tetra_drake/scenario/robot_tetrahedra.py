@@ -60,7 +60,7 @@ class RowCables(Section):
     """The cables of a row of tetrahedra (Table 3 of the thesis)."""
 
     damping: Damping = Field(ge=0)
-    """Damping coefficient of a cable: tension divided by the rate of its length."""
+    """Damping of a cable: tension per rate of its length."""
 
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of outer cables, which join base nodes of one name."""
@@ -69,7 +69,7 @@ class RowCables(Section):
     free_length: Length = Field(ge=0)
     """Length without tension."""
     slack: bool
-    """True if a cable pulls only while it is stretched; otherwise it also pushes (Eq. 6)."""
+    """True if cables go slack; otherwise they also push (Eq. 6)."""
 
     def law(self, cable: str) -> CableLaw:
         """Constants (SI) of the force law of one cable of a junction, such as "outer top"."""
@@ -104,8 +104,8 @@ class Tetrahedra(RobotSettings):
     payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
     """Point mass at the centre of each tetrahedron, such as its motors."""
     contacts: Literal["thesis", "all"] = "thesis"
-    """Nodes that the ground can touch. `thesis`: the bottom nodes and the foremost tip, which reach
-    flat ground. `all`: all four of every tetrahedron."""
+    """Nodes that the ground can touch: `thesis`, the bottom nodes and the foremost tip, or
+    `all`."""
     actuation: list[Annotated[list[CableName], Field(min_length=1)]] = Field(
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )
