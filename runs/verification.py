@@ -21,7 +21,7 @@ import verification_references as references
 import yaml
 from page import rendered
 from pydrake.multibody.tree import RotationalInertia
-from script import run_script
+from script import script
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
@@ -212,6 +212,7 @@ def save_film(name: str) -> None:
     result.save_video(HERE / f"{name}.gif", **film)
 
 
+@script
 def main(names: Sequence[str]) -> None:
     """Runs problems, all without names, and writes the page."""
     if names == ["films"]:
@@ -229,7 +230,3 @@ def main(names: Sequence[str]) -> None:
         results = read_json(file, "results") | results
     write_whole(file, json.dumps(results, indent=1) + "\n")
     write_page(results)
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -14,7 +14,6 @@ from tetra_drake.errors import InputError
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Controller, controlled_robot
 from tetra_drake.robot.readings import Readings
-from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -100,10 +99,3 @@ def test_a_controller_may_have_further_ports_and_makes_no_algebraic_loop(walking
     diagram.GetInputPort("wanted").FixValue(context, -0.25 * structure.initial_lengths)
     found = diagram.GetOutputPort("signals").Eval(context)
     np.testing.assert_allclose(found, 0.75 * robot.starting_cables().length, rtol=1e-12)
-
-
-def test_a_robot_without_signals_needs_none():
-    robot = Robot.of(load_scenario("prism").with_changes({"robot.actuated": {}}))
-    diagram = MakeTensegrityDiagram(robot)
-    assert diagram.num_input_ports() == 0
-    assert diagram.GetOutputPort("signals").size() == 0

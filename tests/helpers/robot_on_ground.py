@@ -5,7 +5,7 @@ import numpy as np
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
 from tetra_drake.laws.forces import Forces, add_ground_forces, move_contacts
-from tetra_drake.laws.mode_change import mode_margin, time_to_mode_change
+from tetra_drake.laws.mode_change import modes_after_step, time_to_mode_change
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
@@ -61,8 +61,10 @@ class RobotOnGround:
         forces = self.meet(state)
         return time_to_mode_change(self.model, state, acceleration, self.modes, forces, 9.0)
 
-    def margin_at(self, state: np.ndarray) -> float:
-        return mode_margin(Packed((self.model, Forces.of(self.model))), state, self.modes)
+    def is_due_at(self, state: np.ndarray) -> bool:
+        """True if a mode changes at once when a step ends here."""
+        parts = Packed((self.model, Forces.of(self.model)))
+        return bool(modes_after_step(parts, state, self.modes.copy()))
 
-    def margin(self, v=REST, p=TOUCHING) -> float:
-        return self.margin_at(self.state(v, p))
+    def is_due(self, v=REST, p=TOUCHING) -> bool:
+        return self.is_due_at(self.state(v, p))

@@ -16,14 +16,12 @@ from helpers.recorded import recorded_run
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import read_manifest
-from tetra_drake.lab.elites.elites import elites
 from tetra_drake.lab.study.robustness import DRAWS
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.parameter_space import ParameterSpace
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
-from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.units import INCH
 
@@ -94,14 +92,6 @@ def test_a_record_holds_every_value_of_its_scenario(name):
         assert cpg[0] == cpg[1], file
         for section, values in recorded.items():
             assert dump_yaml({section: values}) == dump_yaml({section: now[section]}), file
-
-
-@pytest.mark.parametrize("name", some("motors-map", "prism"))
-def test_all_lines_of_a_run_are_its_own(name):
-    run = recorded_run(name)
-    assert len(run.evaluations) and len(run.iterations)
-    is_map = isinstance(run.scenario.optimizer, QualityDiversity)
-    assert len(elites(run)) > 0 if is_map else elites(run).empty
 
 
 @pytest.mark.parametrize("name", FOLDERS)

@@ -25,7 +25,7 @@ def test_the_example_has_what_its_page_says() -> None:
     assert blueprint.cable_names == ("guy left mid", "guy right mid", "sling left west east right")
     assert blueprint.cable_rings == {2: (names.index("west"), names.index("east"))}
     length = 20.0 + 2.0 * np.hypot(20.0, 82.0)
-    assert blueprint.cable_laws[2]["free_length"] == pytest.approx(0.01 * length - 1.0 / 500.0)
+    assert blueprint.cable_laws[2].free_length == pytest.approx(0.01 * length - 1.0 / 500.0)
     assert blueprint.groups == ((2,),)
     pairs = [[names[node] for node in joint] for joint in blueprint.joints]
     assert blueprint.joint_keys == ("joints.knee", "joints.mid-2")

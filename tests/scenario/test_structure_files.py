@@ -48,7 +48,7 @@ def test_numbers_of_groups_have_dotted_keys(folder: Path) -> None:
     changed = scenario.with_numbers({"robot.cables.long.tension": 4.0, "robot.masses.g": 1.0})
     assert changed.robot.masses == {"g": 1.0}
     for given, tension in ((changed, 4.0), (scenario, 2.0)):
-        free_length = given.robot.blueprint().cable_laws[2]["free_length"]
+        free_length = given.robot.blueprint().cable_laws[2].free_length
         assert free_length == approx(np.hypot(0.07, 0.10) - tension / 100.0)
 
 

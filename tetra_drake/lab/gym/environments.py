@@ -192,10 +192,8 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
         """Simulates a control period. `actions` (N, actions) are shares of the typical amplitude,
         see tetra_drake.gym. Raises InputError for a robot without an episode."""
-        simulation, again = (
-            self.simulation,
-            self._ended & (self._autoreset == AutoresetMode.NEXT_STEP),
-        )
+        simulation = self.simulation
+        again = self._ended & (self._autoreset == AutoresetMode.NEXT_STEP)
         if again.any():
             self._begin(again)
         if (over := ~(again | self._going)).any():

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tetra_drake.engines.lanes.sparse import BLOCK, Schedule, factorise, solve
+from tetra_drake.laws.sparse import BLOCK, Schedule, factorise, solve
 
 GRAPHS = {
     "one body": (1, []),
