@@ -127,6 +127,15 @@ def test_a_page_says_how_far_its_best_gait_walks_and_how_long(runs):
     assert {"champion", "motors", "pair", "rough", "steps", "twelve", "winch"} <= said
 
 
+def test_the_gallery_says_how_long_a_gait_walks_and_which_walks_farthest(runs):
+    best = tables.best_of_all(runs)
+    for name, one in best.items():
+        told = re.search(r"in (\d+) s\b", one.title)
+        assert tables.scenario_of(name).simulation.duration == float(told[1] if told else 15.0)
+    inches = {name: one.reached["compiled"] for name, one in best.items() if one.unit == INCH}
+    assert max(inches, key=inches.__getitem__) == "champion"  # as README and its page say
+
+
 def test_numbers_in_the_text_are_those_of_the_records(runs):
     """On the pages README.md and runs/README.md, outside their tables."""
     front, page = (
