@@ -4,12 +4,12 @@ import numpy as np
 
 from tetra_drake.engines.lanes.dynamics import Solver, implicit_matrix
 from tetra_drake.engines.lanes.ros2 import StepMemory, take_step
-from tetra_drake.engines.lanes.sparse import Schedule
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.lanes import Real, Table
 from tetra_drake.kernels.packed import Packed, allocate, unpacked
 from tetra_drake.laws.forces import Forces, compute_forces, move_robot, sizes_of
 from tetra_drake.laws.model import Model
+from tetra_drake.laws.sparse import Schedule
 
 Parts = Packed[tuple[Model, Solver, Forces, StepMemory]]
 
