@@ -335,7 +335,7 @@ def intervals(records: Sequence[Record]) -> str:
 
 def page(records: Sequence[Record]) -> str:
     """Text of the page, from the records."""
-    settings = {"tasks": TASKS, "episodes": EPISODES, "seeds": SEEDS, "least": LEAST_SPEED}
+    settings = {"tasks": TASKS, "episodes": EPISODES, "seeds": SEEDS}
     tables: dict[str, Any] = {"table": pandas.DataFrame(records), "means": means(records)}
     tables |= {"names": entry_names(records), "shares": shares(records), "overall": overall}
     return rendered("bench.md", **settings, **tables)

@@ -122,7 +122,6 @@ def trials_numbers(run: Run) -> dict[str, Any]:
         "trial_seconds": seconds * iterations,
         "hertz": hertz,
         "swing": fixed(np.ptp(signals[trial]) / POUND_FORCE),
-        "twist": f"{best[['twist', 'lateral_drift']].to_numpy().max() / INCH:.0e}",
         **weights_pattern(run),
     }
 

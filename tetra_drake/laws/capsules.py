@@ -89,11 +89,11 @@ class StrutContactLaw(NamedTuple):
     """Arguments of the law of contact between struts, for the kernels: whether it acts, and its
     constants as arrays."""
 
-    acts: bool
+    acts: bool = False
     """False if struts pass through each other."""
-    normal: Table
+    normal: Table = np.zeros(2)
     """The fields of NormalForce as an array."""
-    search: Table
+    search: Table = np.zeros(4)
     """The fields of StrutSearch as an array."""
 
 
@@ -326,7 +326,7 @@ class NoStrutContact(Section):
     def law(self, search: StrutSearch) -> StrutContactLaw:
         """Law for the kernels that exerts no force. `search` has the constants of the search for
         near struts; it is stored but has no effect."""
-        return StrutContactLaw(acts=False, normal=np.zeros(2), search=np.array(search))
+        return StrutContactLaw(search=np.array(search))
 
 
 class HuntCrossley(Section):
@@ -334,7 +334,7 @@ class HuntCrossley(Section):
     d of the overlap, with the rate d', is F = k d (1 + c d'); see laws.capsules."""
 
     stiffness: Stiffness = Field(gt=0)
-    """Stiffness k: force divided by depth of the overlap."""
+    """Stiffness k of the overlap."""
     dissipation: InverseSpeed = Field(ge=0)
     """Hunt-Crossley dissipation c, as in Drake. An impact at a low speed v has the restitution 1 -
     2/3 c v."""

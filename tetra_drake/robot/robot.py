@@ -113,9 +113,8 @@ class Robot:
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
-                own = cable.CableLaw(**laws[number])
-                without = own.cut()._replace(free_length=0.0, intact=own.intact)
-                laws[number] = without._asdict()
+                own = laws[number]
+                laws[number] = own.cut()._replace(free_length=0.0, intact=own.intact)
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),
@@ -194,7 +193,7 @@ class Robot:
             stiffness_at_rest,
         )
 
-        aloft = Unactuated(self.model._replace(ground=Ground.nowhere()))
+        aloft = Unactuated(self.model._replace(ground=Ground()))
         damping = damping_at_rest(aloft, self.structure.initial_state)
         squares, modes = linalg.eigh(stiffness_at_rest(aloft).toarray(), mass_matrix(aloft))
         rates = np.sqrt(np.maximum(squares, 0.0))

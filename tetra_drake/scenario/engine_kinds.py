@@ -28,7 +28,7 @@ class EngineSettings(Section):
 
 
 class Drake(EngineSettings):
-    """Settings of the engine that integrates a Drake diagram with error control.
+    """Integration of a Drake diagram with error control.
 
     The mode of a node is whether it touches the ground, and whether it sticks.
     """
@@ -47,16 +47,15 @@ class Drake(EngineSettings):
     """Longest step. By default 8 ms, or 12 ms where friction is nearly viscous; less if that ratio
     is below 0.05."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
-    """When a node may change its mode: at the end of steps, or where a witness function is zero.
-    `witness` needs short steps."""
+    """When a node may change its mode: at the end of steps, or where a witness function changes
+    sign. `witness` needs short steps."""
     look_ahead: Time | None = Field(default=None, ge=0)
     """Shortest step that ends at a predicted mode change; 0 for none. By default 20 us; 0.3 ms
     where friction is nearly viscous."""
 
 
 class Compiled(EngineSettings):
-    """Settings of the compiled engine: a Rosenbrock method in machine code, which simulates many
-    gaits side by side."""
+    """A Rosenbrock method in machine code, which simulates many gaits side by side."""
 
     module: ClassVar[str] = "tetra_drake.engines.lanes.batch"
     tolerance: Speed | None = Field(default=None, gt=0)
@@ -85,7 +84,7 @@ def look_ahead(tolerance: float) -> float:
 
 
 class Mujoco(EngineSettings):
-    """Settings of the engine MuJoCo, with MuJoCo's own contact. Its grounds are planes."""
+    """MuJoCo with its own contact. Its grounds are planes."""
 
     module: ClassVar[str] = "tetra_drake.engines.mujoco"
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)

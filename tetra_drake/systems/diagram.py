@@ -25,7 +25,6 @@ from pydrake.systems.primitives import ConstantVectorSource, PassThrough, Trajec
 from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.errors import InputError, check_type
-from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.matsuoka import Matsuoka
 from tetra_drake.laws.oscillator import Oscillators
 from tetra_drake.robot.gait import Gait, SteeringSignal
@@ -264,11 +263,11 @@ def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
             name,
             nodes[first],
             nodes[last],
-            CableLaw(**structure.cable_laws[cable]),
+            law,
             rings=tuple(nodes[node] for node in structure.cable_rings.get(cable, ())),
         )
-        for cable, (name, (first, last)) in enumerate(
-            zip(structure.cable_names, structure.cable_ends, strict=True)
+        for cable, (name, law, (first, last)) in enumerate(
+            zip(structure.cable_names, structure.cable_laws, structure.cable_ends, strict=True)
         )
     ]
 
