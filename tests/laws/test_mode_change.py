@@ -6,26 +6,12 @@ from helpers.robot_on_ground import RobotOnGround
 from scipy.spatial.transform import Rotation
 
 from tetra_drake.laws.contact import HEADING, MODE
-from tetra_drake.laws.friction import Coulomb, ResetConstants, first_zero
+from tetra_drake.laws.friction import Coulomb, ResetConstants
 from tetra_drake.laws.terrain import Flat, Incline
 from tetra_drake.scenario.scenario import Scenario
 
 SLOPE = 0.2
 R = np.array([[np.cos(SLOPE), 0, -np.sin(SLOPE)], [0, 1, 0], [np.sin(SLOPE), 0, np.cos(SLOPE)]])
-
-
-ZEROS = [(1.0, -2.0, 0.0, 0.5)]  # 1 - 2 t
-ZEROS += [(1.0, 0.0, -50.0, 0.2)]  # 1 - 25 t^2
-ZEROS += [(1.0, -3.0, 4.0, 0.5)]  # 1 - 3 t + 2 t^2 = (1 - t)(1 - 2 t)
-ZEROS += [(1.0, 3.0, 4.0, 9.0)]  # both roots in the past
-ZEROS += [(1.0, -1.0, 4.0, 9.0)]  # turns before zero
-ZEROS += [(0.0, -1.0, 0.0, 9.0)]  # is there already: the mode changes now, not later
-ZEROS += [(1.0, -0.01, 0.0, 9.0)]  # beyond the horizon
-
-
-@pytest.mark.parametrize(("value", "rate", "rate_rate", "expected"), ZEROS)
-def test_first_zero_of_a_quadratic(value, rate, rate_rate, expected):
-    assert first_zero(value, rate, rate_rate, 9.0) == pytest.approx(expected, rel=1e-14)
 
 
 # The reset integrator, on flat ground.
@@ -39,21 +25,25 @@ def reset(scenario: Scenario) -> RobotOnGround:
     return robot
 
 
-def test_the_margin_crosses_zero_at_the_stiction_range_and_at_the_surface(reset):
-    p0 = ResetConstants(*reset.model.ground.friction.constants).stiction_range
-    near, far = ((factor * p0, 0.0, -1e-4) for factor in (0.9, 1.1))
-    assert reset.margin(p=near) > 0.0 > reset.margin(p=far)
-    assert reset.margin(p=(0.0, 0.0, -1e-6)) > 0.0 > reset.margin(p=(0.0, 0.0, 1e-6))
+def test_a_change_is_due_at_the_stiction_range_and_at_the_surface(reset):
+    p0, outward = (
+        ResetConstants(*reset.model.ground.friction.constants).stiction_range,
+        (1e-9, 0, 0),
+    )
+    near, far = ((factor * p0, 0.0, -1e-4) for factor in (0.9999, 1.0001))
+    assert [reset.is_due(outward, p) for p in (near, far)] == [False, True]
+    assert [reset.is_due(p=(0.0, 0.0, z)) for z in (-1e-6, 1e-6)] == [False, True]
+    assert not reset.is_due((-1e-9, 0.0, 0.0), far), "a node that moves back stays stuck"
 
 
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("mode", [-1.0, 1.0])
-def test_the_margin_of_a_slipping_node_is_its_speed_that_way(reset, axis, mode):
+def test_a_slipping_node_sticks_when_its_velocity_changes_sign(reset, axis, mode):
     reset.modes[2, MODE + axis] = mode  # of T2's bottom left
-    for speed in (3e-6, -3e-6):  # the least of all margins; the others are 1e-4 m
+    for speed in (3e-6, -3e-6):
         state = reset.state()
         state[35 + 6 + 3 + axis] = mode * speed
-        assert reset.margin_at(state) == pytest.approx(speed, rel=1e-12)
+        assert reset.is_due_at(state) == (speed < 0.0)
 
 
 FORESEEN = [(0.05, 0.0, 0.004 * 0.0254 / 0.05)]  # free at p0 / v
@@ -70,7 +60,7 @@ def test_a_reset_at_the_range_is_no_mode_change(scenario):
     robot = RobotOnGround(scenario, np.eye(3))
     robot.update()
     far, fast = 1.1 * scenario.friction.stiction_range, (0.05, 0.0, 0.0)
-    assert robot.margin(p=(far, 0.0, -1e-4)) > 0.0
+    assert not robot.is_due(fast, (far, 0.0, -1e-4))
     assert robot.time_to_change(fast) == 9.0, "the horizon"
 
 
@@ -113,20 +103,19 @@ def test_a_node_over_a_slope_lands_when_the_gap_is_closed(sliding):
 
 
 @pytest.mark.parametrize("mode", [0.0, 1.0])
-def test_the_margin_crosses_zero_where_the_pull_crosses_the_limit(sliding, mode, scenario):
+def test_a_change_is_due_where_the_pull_crosses_the_limit(sliding, mode, scenario):
     sliding.modes[:, MODE] = mode
     limit = (0.5 if mode else 0.6) * scenario.ground.stiffness * 1e-4
-    below, above = (sliding.margin((factor * limit / 70.0, 0.0, 0.0)) for factor in (0.999, 1.001))
-    assert below * above < 0.0
-    assert (below < 0.0) == bool(mode), "in slip, a mode change is due below it"
+    due = [sliding.is_due((factor * limit / 70.0, 0.0, 0.0)) for factor in (0.999, 1.001)]
+    assert due == ([True, False] if mode else [False, True]), "in slip, below it"
 
 
 @pytest.mark.parametrize("way", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-0.6, 0.8, 0.0)])
 def test_beyond_the_limit_a_node_that_moves_back_stays_stuck(sliding, way):
     # The bristle is a millimetre out: 1 N.
     p = 1e-3 * np.array(way) - [0.0, 0.0, 1e-4]
-    assert sliding.margin(-1e-5 * np.array(way), p=p) > 0.0
-    assert sliding.margin(1e-5 * np.array(way), p=p) < 0.0
+    due = [sliding.is_due(sign * 1e-5 * np.array(way), p) for sign in (-1.0, 1.0)]
+    assert due == [False, True]
 
 
 def test_the_heading_is_that_of_the_body_at_touchdown(sliding):

@@ -210,6 +210,9 @@ class Cables(NamedTuple):
         return np.array(pieces, dtype=np.int64).reshape(-1, 2)
 
 
+NO_CABLES = Cables.of(np.zeros(0, cable_type(0)))
+
+
 @inlined
 def law_of(cables: Cables, i: int) -> CableLaw:
     """Constants of cable i, from the tables of the constants of all cables."""

@@ -89,11 +89,11 @@ class StrutContactLaw(NamedTuple):
     """Arguments of the law of contact between struts, for the kernels: whether it acts, and its
     constants as arrays."""
 
-    acts: bool
+    acts: bool = False
     """False if struts pass through each other."""
-    normal: Table
+    normal: Table = np.zeros(2)
     """The fields of NormalForce as an array."""
-    search: Table
+    search: Table = np.zeros(4)
     """The fields of StrutSearch as an array."""
 
 
@@ -326,7 +326,7 @@ class NoStrutContact(Section):
     def law(self, search: StrutSearch) -> StrutContactLaw:
         """Law for the kernels that exerts no force. `search` has the constants of the search for
         near struts; it is stored but has no effect."""
-        return StrutContactLaw(acts=False, normal=np.zeros(2), search=np.array(search))
+        return StrutContactLaw(search=np.array(search))
 
 
 class HuntCrossley(Section):

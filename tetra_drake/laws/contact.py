@@ -44,7 +44,15 @@ from tetra_drake.kernels.lanes import (
     select,
 )
 from tetra_drake.laws import friction, kinematics, terrain
-from tetra_drake.laws.vectors import cross, difference, put_vector, sum_of, vector_at
+from tetra_drake.laws.vectors import (
+    NO_INDICES,
+    NO_NUMBERS,
+    cross,
+    difference,
+    put_vector,
+    sum_of,
+    vector_at,
+)
 from tetra_drake.settings.quantities import DampingPerLength, Stiffness
 from tetra_drake.settings.section import Section, Varied
 
@@ -77,49 +85,31 @@ class NormalForce(NamedTuple):
 
 class Ground(NamedTuple):
     """Ground as an argument of kernels: its laws and surface, and the nodes that may touch it
-    (contact nodes) with the spheres about them (feet)."""
+    (contact nodes) with the spheres about them (feet). By default no node touches it."""
 
-    contacts: Table
+    contacts: Table = NO_INDICES
     """Rows (contacts,) of the table `nodes` on which the ground acts. The row of a foot without
     radius is its contact node. The rows of round feet are their lowest points, after all nodes."""
-    centres: Table
+    centres: Table = NO_INDICES
     """Indices of the contact nodes (contacts,), which are the centres of the feet."""
-    radius: Table
+    radius: Table = NO_NUMBERS
     """Radii of the feet (contacts,)."""
-    carriers: Table
+    carriers: Table = NO_INDICES
     """Index of the body of each contact node (contacts,), ascending."""
-    is_round: bool
+    is_round: bool = False
     """True if at least one foot has a radius."""
-    normal: Table
+    normal: Table = np.zeros(2)
     """The fields of NormalForce as an array."""
-    friction: friction.FrictionLaw
-    flat: bool
-    grid: Table
+    friction: friction.FrictionLaw = friction.FrictionLaw(0, np.zeros(1))
+    flat: bool = True
+    grid: Table = np.zeros(len(terrain.SurfaceGrid._fields))
     """The fields of terrain.SurfaceGrid as an array."""
-    heights: Any
+    heights: Any = NO_NUMBERS
     """Heights (points,) of the surface's control points in m, row by row, then of rolled surfaces.
     None in lanes, which share one table of heights."""
-    rolled: Table
+    rolled: Table = np.zeros((0, len(terrain.SurfaceGrid._fields)))
     """The fields of terrain.SurfaceGrid (contacts, fields), for each foot of the surface that its
     centre meets. Empty without round feet, and on planes."""
-
-    @classmethod
-    def nowhere(cls) -> Self:
-        """Ground without contact nodes, for a robot that touches nothing."""
-        no_index, none = np.zeros(0, dtype=np.int64), np.zeros(0)
-        return cls(
-            contacts=no_index,
-            centres=no_index,
-            radius=none,
-            carriers=no_index,
-            is_round=False,
-            normal=np.zeros(2),
-            friction=friction.FrictionLaw(0, np.zeros(1)),
-            flat=True,
-            grid=np.zeros(len(terrain.SurfaceGrid._fields)),
-            heights=none,
-            rolled=np.zeros((0, len(terrain.SurfaceGrid._fields))),
-        )
 
     def under(self, centres: Table, *, carriers: Table, radius: Table, nodes: int) -> Self:
         """Copy of this ground that acts on the given contact nodes.

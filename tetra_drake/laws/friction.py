@@ -32,9 +32,9 @@ friction. A node that sticks may creep, because its bristle bends. Modes are con
 of an integrator, so forces are smooth there. Modes change at the end of a step. With a law without
 stiction, nodes always stick.
 
-Both laws have the same functions of a Slide: force, damping, next mode, margin, and time to the
-next change. by_law() chooses between them. A further law needs settings, constants, these
-functions, and its line in by_law(). A law of a plug-in has them in a FrictionFunctions.
+Both laws have the same functions of a Slide: force, damping, next mode, and time to the next
+change. by_law() chooses between them. A further law needs settings, constants, these functions, and
+its line in by_law(). A law of a plug-in has them in a FrictionFunctions.
 """
 
 from __future__ import annotations
@@ -381,26 +381,6 @@ def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
 
 
 @inlined
-def reset_margin(slide: Slide, law: ResetConstants) -> float:
-    """Mode margin of the reset integrator: positive until the mode changes along a tangent.
-
-    It is the smaller margin of the two tangents, in m in stick and in m/s in slip; only the sign
-    has a meaning. A node that sticks may be at the stiction range as long as it moves inward.
-    """
-    margin = math.inf
-    for tangent in (slide.t1, slide.t2):
-        if tangent.mode == STICK and law.restarts != 0.0:
-            continue
-        if tangent.mode == STICK:
-            reserve = law.stiction_range - abs(tangent.deflection)
-            inward = -tangent.velocity * tangent.deflection
-            margin = min(margin, max(reserve, inward) if inward > 0.0 else reserve)
-        else:
-            margin = min(margin, tangent.mode * tangent.velocity)
-    return margin
-
-
-@inlined
 def time_to_reset_change(
     slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: ResetConstants
 ) -> Real:
@@ -603,21 +583,6 @@ def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
 
 
 @inlined
-def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
-    """Mode margin (N) of Coulomb friction: positive until the mode changes.
-
-    If the node slips, it is the size of the bristle's force less its limit. If the node sticks, it
-    is the limit less the size. It stays positive beyond the limit while the node moves inward, so
-    that u . v < 0 with the bristle's force u and the velocity v.
-    """
-    bristle = bristle_force(slide, law)
-    if not bristle.stuck:
-        return bristle.size - bristle.limit
-    outward = bristle.u_1 * slide.t1.velocity + bristle.u_2 * slide.t2.velocity
-    return max(bristle.limit - bristle.size, -outward)
-
-
-@inlined
 def time_to_coulomb_change(
     slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: CoulombConstants
 ) -> Real:
@@ -651,12 +616,6 @@ def always_sticks(slide: Slide, law: Any) -> NextMode:
 
 
 @inlined
-def endless_margin(slide: Slide, law: Any) -> float:
-    """Mode margin of a law without stiction: infinite."""
-    return math.inf
-
-
-@inlined
 def no_change(slide: Slide, acceleration: Vector2, rate: Real, horizon: Real, law: Any) -> Real:
     """Time (s) to the next mode change of a law without stiction: the horizon."""
     return horizon
@@ -664,7 +623,7 @@ def no_change(slide: Slide, acceleration: Vector2, rate: Real, horizon: Real, la
 
 @dataclass(frozen=True)
 class FrictionFunctions(OwnFunctions):
-    """Functions of a plug-in's law of friction. The last three have defaults for laws without
+    """Functions of a plug-in's law of friction. The last two have defaults for laws without
     stiction, whose force is a smooth function of velocity and normal force."""
 
     force: Callable[..., Vector2]
@@ -673,8 +632,6 @@ class FrictionFunctions(OwnFunctions):
     """Damping matrix, like reset_damping(); arguments: slide, time (s), constants."""
     next_mode: Callable[..., NextMode] = always_sticks
     """Mode after a step, like next_reset_mode(); arguments: slide, constants."""
-    margin: Callable[..., float] = endless_margin
-    """Mode margin, like reset_margin(); arguments: slide, constants."""
     time_to_change: Callable[..., Real] = no_change
     """Time (s) to the next mode change, like time_to_reset_change(); arguments: slide,
     acceleration, rate of the normal force, horizon, constants."""
@@ -713,10 +670,6 @@ of -(time d/dv + time² d/dx); arguments: slide, time (s)."""
 next_mode = by_law("next_mode", next_reset_mode, next_coulomb_mode)
 """Friction mode (NextMode) at the end of a step, for a node that stays on the ground; arguments:
 slide."""
-
-friction_margin = by_law("margin", reset_margin, coulomb_margin)
-"""Mode margin of a node on the ground: positive until its friction mode changes, zero at the
-change. Only the sign has a meaning. Arguments: slide."""
 
 time_to_friction_change = by_law("time_to_change", time_to_reset_change, time_to_coulomb_change)
 """Time (s) to the next change of the friction mode of a node, at most a horizon; arguments: slide,

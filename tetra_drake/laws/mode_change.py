@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, any_lane, minimum, named, select
 from tetra_drake.kernels.packed import unpacked
@@ -25,31 +23,6 @@ def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
     return contact.update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
-
-
-@compiled
-def mode_margin(parts: Parts, state: Table, modes: Table) -> float:
-    """Mode margin of the robot: positive until the first contact or friction mode changes, zero at
-    the change.
-
-    It is the least of the gaps (m) of nodes in the air, the depths (m) of nodes in the ground, and
-    the margins of friction, which have other units. So only the sign has a meaning. `parts` is a
-    Model and its Forces. `state` is [q; v] (13*bodies,). `modes` (contacts, 12) is only read. Also
-    writes nodes and ground frames to the Forces.
-    """
-    robot, forces = unpacked(parts)
-    move_contacts(robot, state, forces)
-    ground, nodes, frames = robot.ground, forces.nodes, forces.frames
-    margin = math.inf
-    for i in range(ground.contacts.size):
-        distance = contact.gap(nodes, ground, frames, i)
-        if modes[i, contact.CONTACT] == 0.0:
-            margin = min(margin, distance)
-            continue
-        margin = min(margin, -distance)
-        slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
-        margin = min(margin, friction.friction_margin(ground.friction, slide))
-    return margin
 
 
 @inlined

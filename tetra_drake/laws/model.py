@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.laws.actuator import Actuator, Force
-from tetra_drake.laws.cable import Cables, cable_type
+from tetra_drake.laws.cable import NO_CABLES, Cables
 from tetra_drake.laws.capsules import StrutContactLaw
 from tetra_drake.laws.contact import Ground
+from tetra_drake.laws.inertia import INERTIA_COLUMNS
 from tetra_drake.laws.struts import Struts
+from tetra_drake.laws.vectors import NO_INDICES, NO_NUMBERS, NO_VECTORS
 
 WORLD = -1
 """Body index that stands for the world. Fixed nodes have it, because they belong to no body."""
@@ -45,29 +47,29 @@ class Couplings(NamedTuple):
     from the first body, with the lower index, to the second body. Straight cables from fixed nodes
     of the world come before all pairs, routed cables after them."""
 
-    first: Table
+    first: Table = NO_INDICES
     """Index of the first body of each pair (pairs,)."""
-    second: Table
+    second: Table = NO_INDICES
     """Index of the second body of each pair (pairs,)."""
-    first_cable: Table
+    first_cable: Table = np.zeros(1, np.int64)
     """Index of the first cable of each pair (pairs + 1,); the last number is the number of
     straight cables."""
-    held: Table
+    held: Table = NO_INDICES
     """Index of the body at the end of each cable from a fixed node (fixed cables,)."""
 
 
 class AnchorSprings(NamedTuple):
     """Springs and dampers that hold nodes of bodies along axes of the world; SI units."""
 
-    nodes: Table
+    nodes: Table = NO_INDICES
     """Indices of the held nodes (anchors,)."""
-    carriers: Table
+    carriers: Table = NO_INDICES
     """Index of the body of each held node (anchors,)."""
-    places: Table
+    places: Table = NO_VECTORS
     """Positions (anchors, 3) at which the springs have no force."""
-    stiffness: Table
+    stiffness: Table = NO_VECTORS
     """Stiffness (anchors, 3) along x, y and z; 0 along a free axis."""
-    damping: Table
+    damping: Table = NO_VECTORS
     """Damping (anchors, 3) along x, y and z; 0 along a free axis."""
 
 
@@ -75,33 +77,34 @@ class Joints(NamedTuple):
     """Ball joints: pairs of nodes of two bodies that a spring and a damper hold together; SI
     units."""
 
-    node_a: Table
+    node_a: Table = NO_INDICES
     """Index of the node of the first body (joints,), which has the lower index."""
-    node_b: Table
+    node_b: Table = NO_INDICES
     """Index of the node of the second body (joints,)."""
-    body_a: Table
+    body_a: Table = NO_INDICES
     """Index of the first body (joints,)."""
-    body_b: Table
+    body_b: Table = NO_INDICES
     """Index of the second body (joints,)."""
-    stiffness: Table
+    stiffness: Table = NO_NUMBERS
     """Stiffness (joints,), the same along all axes."""
-    damping: Table
+    damping: Table = NO_NUMBERS
     """Damping (joints,), the same along all axes."""
-    friction: Table
+    friction: Table = NO_NUMBERS
     """Torque limit (joints,) of the friction; 0 without."""
 
 
 class NodeLoads(NamedTuple):
     """Constant forces (N) on nodes, in the world frame."""
 
-    nodes: Table
+    nodes: Table = NO_INDICES
     """Indices of the loaded nodes (loads,)."""
-    forces: Table
+    forces: Table = NO_VECTORS
     """Forces (loads, 3) in N, in the world frame."""
 
 
 class Model(NamedTuple):
-    """Constants of a robot: its structure and its physical laws; SI units."""
+    """Constants of a robot: its structure and its physical laws; SI units. By default no force acts
+    on its bodies."""
 
     p_BN: Table
     """Positions of the nodes (nodes, 3) in the frames of their bodies, in the order of the bodies;
@@ -109,55 +112,29 @@ class Model(NamedTuple):
     first_node: Table
     """Index of each body's first node (bodies + 1,); the last number is the index of the first
     fixed node."""
-    cables: Cables
-    actuator: Actuator
-    couplings: Couplings
-    ground: Ground
-    anchors: AnchorSprings
-    joints: Joints
-    loads: NodeLoads
     bodies: Bodies
-    struts: Struts
-    strut_contact: StrutContactLaw
-    isotropic: bool
+    cables: Cables = NO_CABLES
+    actuator: Actuator = Force().actuator()
+    couplings: Couplings = Couplings()
+    ground: Ground = Ground()
+    anchors: AnchorSprings = AnchorSprings()
+    joints: Joints = Joints()
+    loads: NodeLoads = NodeLoads()
+    struts: Struts = Struts()
+    strut_contact: StrutContactLaw = StrutContactLaw()
+    isotropic: bool = True
     """True if each body has the same moment of inertia about all axes."""
-    slack: bool
+    slack: bool = True
     """True if cables go slack instead of pushing."""
 
     @classmethod
-    def of_nodes(
-        cls,
-        p_BN: Table,
-        first_node: Table,
-        *,
-        cables: Cables | None = None,
-        actuator: Actuator | None = None,
-        ground: Ground | None = None,
-        slack: bool = True,
-    ) -> Self:
-        """Model with cables only, or with ground contact only.
+    def of_nodes(cls, p_BN: Table, first_node: Table, **laws: Any) -> Self:
+        """Model that gives forces on nodes; the masses of its bodies are 0.
 
-        It gives forces on nodes; the masses of its bodies are 0. `p_BN` (nodes, 3) are positions of
-        the nodes (m) in the frames of their bodies, `first_node` (bodies + 1,) the index of each
-        body's first node, then the number of nodes on bodies. With `slack`, cables go slack instead
-        of pushing.
+        `p_BN` (nodes, 3) are positions of the nodes (m) in the frames of their bodies, `first_node`
+        (bodies + 1,) the index of each body's first node, then the number of nodes on bodies.
+        `laws` are other fields of a Model.
         """
-        bodies, none = first_node.size - 1, np.zeros(0)
-        no_index, no_vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
-        first = np.zeros(bodies + 1, dtype=np.int64)
-        return cls(
-            p_BN=p_BN,
-            first_node=first_node,
-            cables=cables or Cables.of(np.zeros(0, cable_type(0))),
-            actuator=actuator or Force().actuator(),
-            couplings=Couplings(no_index, no_index, first[:1], no_index),
-            ground=ground or Ground.nowhere(),
-            anchors=AnchorSprings(no_index, no_index, no_vectors, no_vectors, no_vectors),
-            joints=Joints(*[no_index] * 4, *[none] * 3),
-            loads=NodeLoads(no_index, no_vectors),
-            bodies=Bodies(np.zeros(bodies), np.zeros((bodies, 6)), *np.zeros((2, bodies))),
-            struts=Struts(no_index, no_index, no_index, no_index, first, none, none),
-            strut_contact=StrutContactLaw(acts=False, normal=np.zeros(2), search=np.zeros(4)),
-            isotropic=True,
-            slack=slack,
-        )
+        none = np.zeros(first_node.size - 1)
+        bodies = Bodies(none, np.zeros((none.size, INERTIA_COLUMNS)), none, none)
+        return cls(p_BN, first_node, bodies, **laws)

@@ -6,8 +6,7 @@ motions of a robot that is a billion times as stiff in other directions.
 
 from __future__ import annotations
 
-import itertools
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
@@ -19,19 +18,19 @@ from tetra_drake.laws.struts import Axes, axes_of, vector_between
 
 
 class Springs(NamedTuple):
-    """Springs between points of two bodies, or of a body and the world. Each spring has k
-    displacements, such as the 3 components of the relative motion of a cable's ends. A displacement
-    is the sum of two parts, one from the motion of each body."""
+    """Springs whose energy depends on the positions of k nodes each."""
 
-    body_a: np.ndarray
-    """Indices of the first bodies (springs,)."""
-    body_b: np.ndarray
-    motion_a: np.ndarray
-    """Displacements (springs, k, 6) of the springs for unit motions of the first bodies; see
-    kinematics.rigid_motions()."""
-    motion_b: np.ndarray
+    nodes: np.ndarray
+    """Indices of the nodes (springs, k)."""
     stiffness: np.ndarray
-    """Second derivatives (springs, k, k) of the energy with respect to the displacements."""
+    """Second derivatives (springs, 3*k, 3*k) of the energy by the positions, in N/m."""
+
+    @classmethod
+    def between(cls, nodes: np.ndarray, stiffness: np.ndarray) -> Self:
+        """Springs between pairs of nodes (springs, 2), from their stiffness (springs, 3, 3) against
+        displacements of one node relative to the other."""
+        pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return cls(nodes, np.einsum("ab,sij->saibj", pair, stiffness).reshape(-1, 6, 6))
 
 
 def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
@@ -42,150 +41,87 @@ def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
     frame. The units are N m between rotations, N/m between translations, N otherwise. `forces` are
     the forces of a state without motion, with all tables computed.
     """
-    bodies = robot.bodies.mass.size
+    bodies, ground = robot.bodies.mass.size, robot.ground
     carriers = carriers_of(robot.first_node, nodes=len(robot.p_BN))
-    kinds = [_cables, _supports]
-    if robot.cables.routes.nodes.size:
-        kinds += [_pieces, _paths]
-    if robot.joints.node_a.size:
-        kinds += [_joints]
-    if forces.near_struts.count[0]:
-        kinds += [_touching_struts]
-    rows, columns, blocks = [], [], []
-    for kind in kinds:
-        springs = kind(robot, forces, carriers)
-        motion = np.concatenate([springs.motion_a, springs.motion_b], axis=2)
+    p = forces.nodes[: len(carriers), kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    motions = kinematics.rigid_motions(p)
+    rows, columns, blocks = [carriers], [carriers], []
+    for nodes, stiffness in _springs(robot, forces):
+        count, ends = nodes.shape
+        of_ends, motion = stiffness.reshape(count, ends, 3, ends, 3), motions[nodes]
         # Not by BLAS, whose last digits depend on the processor.
-        pulled = np.einsum("kni,knm->kim", motion, springs.stiffness)
-        added = np.einsum("kim,kmj->kij", pulled, motion)
-        ends = np.stack([springs.body_a, springs.body_b], axis=1)
-        for i, j in np.ndindex(2, 2):
-            rows.append(ends[:, i])
-            columns.append(ends[:, j])
-            blocks.append(added[:, 6 * i : 6 * i + 6, 6 * j : 6 * j + 6])
+        added = np.einsum("saibj,sbjn->saibn", of_ends, motion)
+        blocks.append(np.einsum("saim,saibn->sabmn", motion, added).reshape(-1, 6, 6))
+        rows.append(np.repeat(carriers[nodes], ends))
+        columns.append(np.tile(carriers[nodes], ends).ravel())
 
     # The forces on the nodes also have a stiffness as the bodies turn. The line of a normal force
     # goes through the centre of a round foot, so that it counts as a force on the node.
-    ground, nodes = robot.ground, forces.nodes
-    p = nodes[: len(carriers), kinematics.P_BN_W : kinematics.P_BN_W + 3]
-    on_rows = nodes[:, kinematics.FORCE : kinematics.FORCE + 3]
+    on_rows = forces.nodes[:, kinematics.FORCE : kinematics.FORCE + 3]
     force, is_round = on_rows[: len(carriers)].copy(), ground.contacts != ground.centres
     force[ground.centres[is_round]] += on_rows[ground.contacts[is_round]]
     products = np.einsum("ni,nj->nij", p, force)
     trace = np.einsum("nii,jk->njk", products, np.eye(3))
     turning = np.zeros((len(carriers), 6, 6))
     turning[:, :3, :3] = trace - 0.5 * (products + products.transpose(0, 2, 1))
-    row, column = np.concatenate([*rows, carriers]), np.concatenate([*columns, carriers])
+    row, column = np.concatenate(rows), np.concatenate(columns)
     moving = (row != WORLD) & (column != WORLD)
     place, of_block = np.unique((row * bodies + column)[moving], return_inverse=True)
     of_place = csr_array((np.ones(of_block.size), (of_block, np.arange(of_block.size))))
-    summed = np.concatenate([*blocks, turning])[moving].reshape(-1, 36)
+    summed = np.concatenate([turning, *blocks])[moving].reshape(-1, 36)
     data = (of_place @ summed).reshape(-1, 6, 6)
     first = np.searchsorted(place, bodies * np.arange(bodies + 1))
     return bsr_array((data, place % bodies, first), shape=(6 * bodies, 6 * bodies))
 
 
-def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """The straight cables as springs, along them by their stiffness and sideways by their tension.
-    A slack cable has no stiffness. `carriers` (nodes,) is the index of each node's body, WORLD for
-    fixed nodes."""
-    is_straight = np.diff(robot.cables.routes.first) == 0
-    node_a, node_b = robot.cables.node_a[is_straight], robot.cables.node_b[is_straight]
-    parts, lengthwise = forces.cable_forces[is_straight], _lengthwise(robot, forces)[is_straight]
-    direction = parts[:, cable.DIRECTION : cable.DIRECTION + 3]
-    along = np.einsum("ci,cj->cij", direction, direction)
-    length = np.maximum(parts[:, cable.LENGTH], cable.MEETING)
-    sideways = parts[:, cable.TENSION] / length
-    turning = np.where(length > cable.MEETING, sideways, 0.0)
-    return Springs(
-        carriers[node_a],
-        carriers[node_b],
-        _motions(forces, node_a),
-        -_motions(forces, node_b),
-        (lengthwise - turning)[:, None, None] * along + sideways[:, None, None] * np.eye(3),
-    )
-
-
-def _lengthwise(robot: Model, forces: Forces) -> np.ndarray:
-    """Stiffness (cables,) of the cables along their length; 0 for slack ones."""
-    law, parts = robot.cables.law, forces.cable_forces
-    stiffness = cable.elastic_stiffness(parts[:, cable.LENGTH] - law.free_length, law)
-    return np.where((parts[:, cable.TENSION] > 0.0) | (not robot.slack), stiffness, 0.0)
-
-
-def _motions(forces: Forces, nodes: np.ndarray) -> np.ndarray:
-    """Displacements (nodes, 3, 6) of nodes for unit motions of their bodies."""
-    p_BN_W = forces.nodes[:, kinematics.P_BN_W : kinematics.P_BN_W + 3]
-    return kinematics.rigid_motions(p_BN_W[nodes])
-
-
-def _pieces(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """The straight pieces of routed cables as springs that resist displacements across them, by
-    their tension. `carriers` (nodes,) is the index of each node's body."""
-    routes = robot.cables.routes
-    path_of = np.repeat(np.arange(len(routes.first) - 1), np.diff(routes.first))
-    begins = np.flatnonzero(np.diff(path_of, append=-1) == 0)
-    node_a, node_b = routes.nodes[begins], routes.nodes[begins + 1]
-    p_WN = forces.nodes[:, kinematics.P_WN : kinematics.P_WN + 3]
-    p_AB = p_WN[node_b] - p_WN[node_a]
-    length = np.maximum(np.linalg.norm(p_AB, axis=1), cable.MEETING)
-    direction = np.where(length > cable.MEETING, p_AB.T / length, 0.0).T
-    across = np.eye(3) - np.einsum("pi,pj->pij", direction, direction)
-    sideways = forces.cable_forces[path_of[begins], cable.TENSION] / length
-    motion_a, motion_b = _motions(forces, node_a), -_motions(forces, node_b)
-    stiffness = sideways[:, None, None] * across
-    return Springs(carriers[node_a], carriers[node_b], motion_a, motion_b, stiffness)
-
-
-def _paths(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """The stiffness of routed cables along their paths, as springs between all pairs of nodes on a
-    path, also of a node and itself. The displacements (2,) are the parts of both nodes in the
-    change of the cable's length. `carriers` (nodes,) is the index of each node's body."""
-    routes, lengthwise = robot.cables.routes, _lengthwise(robot, forces)
-    pairs, stiffness = [], []
-    for path in np.flatnonzero(np.diff(routes.first)):
-        rows = range(routes.first[path], routes.first[path + 1])
-        for a, b in itertools.combinations_with_replacement(rows, 2):
-            pairs.append((a, b))
-            stiffness.append(lengthwise[path] * np.array([[a == b, a != b], [a != b, 0.0]]))
-    of_pairs = np.array(pairs, dtype=int).reshape(-1, 2)
-    parts = np.einsum("ki,kij->kj", forces.route_slopes, _motions(forces, routes.nodes))
-    motion_a, motion_b = np.zeros((2, len(of_pairs), 2, 6))
-    motion_a[:, 0], motion_b[:, 1] = parts[of_pairs].transpose(1, 0, 2)
-    body_a, body_b = carriers[routes.nodes[of_pairs]].T
-    return Springs(body_a, body_b, motion_a, motion_b, np.reshape(stiffness, (-1, 2, 2)))
-
-
-def _joints(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """The joints as springs. `carriers` (nodes,) is the index of each node's body."""
-    joints = robot.joints
-    return Springs(
-        carriers[joints.node_a],
-        carriers[joints.node_b],
-        _motions(forces, joints.node_a),
-        -_motions(forces, joints.node_b),
-        joints.stiffness[:, None, None] * np.eye(3),
-    )
-
-
-def _supports(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """Contacts with the ground, and anchors, as springs to the world. Contacts have no stiffness
-    along the ground. `carriers` (nodes,) is the index of each node's body."""
-    ground, anchors = robot.ground, robot.anchors
-    law = contact.NormalForce(*ground.normal)
+def _springs(robot: Model, forces: Forces) -> list[Springs]:
+    """All springs of a robot: cables, joints, anchors, contacts with the ground and of struts."""
+    joints, anchors = robot.joints, robot.anchors
     presses = forces.ground_forces[:, contact.NORMAL] > 0.0
-    vertical = np.array([0.0, 0.0, law.stiffness])
-    axes = np.concatenate([presses[:, None] * vertical, anchors.stiffness])
-    nodes = np.concatenate([ground.centres, anchors.nodes])
-    p_BN_W = forces.nodes[nodes, kinematics.P_BN_W : kinematics.P_BN_W + 3]
-    world, motion = np.full(len(nodes), WORLD), kinematics.rigid_motions(p_BN_W)
-    return Springs(carriers[nodes], world, motion, -motion, axes[:, None] * np.eye(3))
+    upward = contact.NormalForce(*robot.ground.normal).stiffness * np.diag([0.0, 0.0, 1.0])
+    return [
+        *_cables(robot, forces),
+        Springs.between(
+            np.stack([joints.node_a, joints.node_b], axis=1),
+            joints.stiffness[:, None, None] * np.eye(3),
+        ),
+        Springs(anchors.nodes[:, None], anchors.stiffness[:, None] * np.eye(3)),
+        # Contacts have no stiffness along the ground.
+        Springs(robot.ground.centres[:, None], presses[:, None, None] * upward),
+        _touching_struts(robot, forces),
+    ]
 
 
-def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """Contacts of struts as springs. A displacement (12,) has the motions (3,) of both ends of the
-    first strut, then of both ends of the second. `carriers` (nodes,) is the index of each node's
-    body."""
+def _cables(robot: Model, forces: Forces) -> list[Springs]:
+    """The straight pieces of all cables as springs, across them by their tension. Along it, a
+    straight cable is a spring of two nodes, a routed cable one of all nodes on its path. A slack
+    cable has no stiffness."""
+    law, routes, parts = robot.cables.law, robot.cables.routes, forces.cable_forces
+    stiffness = cable.elastic_stiffness(parts[:, cable.LENGTH] - law.free_length, law)
+    is_taut = (parts[:, cable.TENSION] > 0.0) | (not robot.slack)
+    lengthwise, counts = np.where(is_taut, stiffness, 0.0), np.diff(routes.first)
+    of_cable = np.repeat(np.arange(counts.size), counts.clip(2) - 1)
+    nodes = robot.cables.pieces
+    p_WN = forces.nodes[:, kinematics.P_WN : kinematics.P_WN + 3]
+    p_AB = p_WN[nodes[:, 1]] - p_WN[nodes[:, 0]]
+    distance = np.linalg.norm(p_AB, axis=1)
+    length = distance.clip(cable.MEETING)
+    along = np.einsum("pi,pj,p->pij", p_AB, p_AB, length**-2.0)
+    sideways = parts[of_cable, cable.TENSION] / length
+    turning = np.where(distance > cable.MEETING, sideways, 0.0)
+    on_line = np.where(counts > 0, 0.0, lengthwise)[of_cable] - turning
+    of_pieces = on_line[:, None, None] * along + sideways[:, None, None] * np.eye(3)
+    springs = [Springs.between(nodes, of_pieces)]
+    for routed in np.flatnonzero(counts):
+        path = slice(*routes.first[routed : routed + 2])
+        slopes = forces.route_slopes[path].ravel()
+        whole = lengthwise[routed] * np.outer(slopes, slopes)
+        springs.append(Springs(routes.nodes[path][None], whole[None]))
+    return springs
+
+
+def _touching_struts(robot: Model, forces: Forces) -> Springs:
+    """Contacts of struts as springs between start and end of the first strut and of the second."""
     near, struts, nodes = forces.near_struts, robot.struts, forces.nodes
     law = contact.NormalForce(*robot.strut_contact.normal)
     ends, stiffness = [], []
@@ -196,17 +132,7 @@ def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Spri
             stiffness.append(_stiffness_of_touch(touch, axes, reach, law.stiffness))
             ends.append([struts.node_a[i], struts.node_b[i], struts.node_a[j], struts.node_b[j]])
     of_touch = np.array(ends, dtype=int).reshape(-1, 4)
-    p_BN_W = nodes[of_touch, kinematics.P_BN_W : kinematics.P_BN_W + 3]
-    motions = kinematics.rigid_motions(p_BN_W.reshape(-1, 3)).reshape(-1, 4, 3, 6)
-    motion_a, motion_b = motions.copy(), motions.copy()
-    motion_a[:, 2:], motion_b[:, :2] = 0.0, 0.0
-    return Springs(
-        carriers[of_touch[:, 0]],
-        carriers[of_touch[:, 2]],
-        motion_a.reshape(-1, 12, 6),
-        motion_b.reshape(-1, 12, 6),
-        np.array(stiffness, dtype=float).reshape(-1, 12, 12),
-    )
+    return Springs(of_touch, np.array(stiffness, dtype=float).reshape(-1, 12, 12))
 
 
 def _stiffness_of_touch(

@@ -8,10 +8,21 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, any_lane, maximum, minimum
 from tetra_drake.laws.kinematics import P_WN
-from tetra_drake.laws.vectors import Vector3, difference, dot, scaled, sum_of, vector_at
+from tetra_drake.laws.vectors import (
+    NO_INDICES,
+    NO_NUMBERS,
+    Vector3,
+    difference,
+    dot,
+    scaled,
+    sum_of,
+    vector_at,
+)
 
 MARGIN = 1.0 + 1e-9
 """Factor on bounds, so that rounding errors cannot exclude a pair whose distance equals a bound."""
@@ -22,19 +33,19 @@ _PARALLEL = 1e-12
 class Struts(NamedTuple):
     """Struts of all bodies, in the order of the bodies."""
 
-    node_a: Table
+    node_a: Table = NO_INDICES
     """Index of the node at one end (struts,)."""
-    node_b: Table
+    node_b: Table = NO_INDICES
     """Index of the node at the other end (struts,)."""
-    place_a: Table
+    place_a: Table = NO_INDICES
     """Number of the place of node a (struts,). Nodes that joints hold together have one place."""
-    place_b: Table
+    place_b: Table = NO_INDICES
     """Number of the place of node b (struts,)."""
-    first_strut: Table
+    first_strut: Table = np.zeros(1, np.int64)
     """Index of each body's first strut (bodies + 1,); the last number is the number of struts."""
-    length: Table
+    length: Table = NO_NUMBERS
     """Lengths (struts,) in m."""
-    radius: Table
+    radius: Table = NO_NUMBERS
     """Radii (struts,) in m."""
 
 

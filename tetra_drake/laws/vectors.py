@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table
 
 Vector3 = tuple[Real, Real, Real]
+
+NO_INDICES, NO_NUMBERS, NO_VECTORS = np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3))
+"""Empty tables, of what a robot does not have."""
 
 
 @inlined

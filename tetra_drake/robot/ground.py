@@ -109,7 +109,7 @@ def make_surface(
         raise InputError(source, "grid", f"has {fault}")
     is_stepped = terrain_kind.is_stepped
     surface_grid = terrain.SurfaceGrid.of(grid.heights, grid.corner, grid.cell, is_stepped)
-    return Ground.nowhere()._replace(
+    return Ground(
         normal=np.array(NormalForce(ground.stiffness, ground.damping)),
         friction=friction.law(),
         flat=terrain_kind.is_flat,

@@ -193,7 +193,7 @@ class Robot:
             stiffness_at_rest,
         )
 
-        aloft = Unactuated(self.model._replace(ground=Ground.nowhere()))
+        aloft = Unactuated(self.model._replace(ground=Ground()))
         damping = damping_at_rest(aloft, self.structure.initial_state)
         squares, modes = linalg.eigh(stiffness_at_rest(aloft).toarray(), mass_matrix(aloft))
         rates = np.sqrt(np.maximum(squares, 0.0))

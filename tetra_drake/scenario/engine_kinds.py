@@ -47,8 +47,8 @@ class Drake(EngineSettings):
     """Longest step. By default 8 ms, or 12 ms where friction is nearly viscous; less if that ratio
     is below 0.05."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
-    """When a node may change its mode: at the end of steps, or where a witness function is zero.
-    `witness` needs short steps."""
+    """When a node may change its mode: at the end of steps, or where a witness function changes
+    sign. `witness` needs short steps."""
     look_ahead: Time | None = Field(default=None, ge=0)
     """Shortest step that ends at a predicted mode change; 0 for none. By default 20 us; 0.3 ms
     where friction is nearly viscous."""

@@ -2,12 +2,11 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field
 
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.settings.plugins import OPTIMIZERS
 from tetra_drake.settings.quantities import TWO, Time, by_name
-from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Kinds, Section
 
 MOST_GAITS = 100_000
@@ -76,6 +75,13 @@ class RandomSearch(OptimizerSettings):
     """Baseline for other optimisers: all gaits are random."""
 
 
+def _checked_range(ends: list[float]) -> list[float]:
+    low, high = ends
+    if low >= high:
+        raise ValueError(f"found {low}, expected less than the range's end, {high}")
+    return ends
+
+
 CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
@@ -93,23 +99,15 @@ class QualityDiversity(OptimizerSettings):
 
     measures: Annotated[
         dict[str, list[float]],
-        *by_name(UNITS, lambda x: Annotated[list[x], TWO]),
-    ] = Field(default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]})
+        *by_name(UNITS, lambda x: Annotated[list[x], TWO, AfterValidator(_checked_range)]),
+    ] = Field(
+        default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}, min_length=2, max_length=2
+    )
     """Two metrics with their ranges on the map; cells at the edge also have what is outside."""
     cells: list[CellCount] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)
     """Number of draws of disturbances; each gait of the map is simulated in all at the end."""
-
-    @model_validator(mode="after")
-    def _check(self) -> "QualityDiversity":
-        if len(self.measures) != 2:
-            refuse("measures", f"found {len(self.measures)} metrics, expected two")
-        for name, (low, high) in self.measures.items():
-            if low >= high:
-                problem = f"found {low}, expected less than the range's end, {high}"
-                refuse(f"measures.{name}", problem)
-        return self
 
 
 OptimizerKind = Annotated[

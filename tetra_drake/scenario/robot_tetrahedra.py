@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import operator
 from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
@@ -13,15 +12,12 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.robot_settings import RobotSettings
-from tetra_drake.scenario.start import Start
-from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
+from tetra_drake.scenario.tolerances import check_tolerances
 from tetra_drake.settings.quantities import (
-    Acceleration,
     Damping,
     Density,
     Length,
     Mass,
-    Position,
     Stiffness,
     quantity,
 )
@@ -105,12 +101,6 @@ class Tetrahedra(RobotSettings):
     spacing: Annotated[Spacing, Varied()] = Field(ge=0)
     """Distance between base triangles at t = 0. `balanced` (or 0): where the cables balance; also
     where a file changes its base's strut length, or cables' stiffness or free length."""
-    gravity: Acceleration = Field(ge=0)
-    """Acceleration of gravity."""
-    offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each tetrahedron at t = 0."""
-    start: Start | None = Field(default=None, exclude_if=operator.not_)
-    """How the robot is turned and moves at t = 0; at rest if there is none."""
     payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
     """Point mass at the centre of each tetrahedron, such as its motors."""
     contacts: Literal["thesis", "all"] = "thesis"
@@ -120,8 +110,6 @@ class Tetrahedra(RobotSettings):
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )
     """Groups of a junction's cables that share an oscillator."""
-    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key, such as `cables.outer_stiffness: 2 %`."""
 
     _check_known = model_validator(mode="after")(check_tolerances)
 

@@ -8,7 +8,6 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -292,12 +291,13 @@ def AddCables(
     names = [one.name for one in cables]
     if scene_graph is not None:
         check_part("AddCables", "scene_graph", builder, scene_graph, SceneGraph)
-    laws: dict[str, Any] = {
-        "cables": cable.Cables.of(table, rings),
-        "actuator": actuation.actuator(),
-        "slack": slack,
-    }
-    model = Model.of_nodes(nodes.p_BN, nodes.first_node, **laws)
+    model = Model.of_nodes(
+        nodes.p_BN,
+        nodes.first_node,
+        cables=cable.Cables.of(table, rings),
+        actuator=actuation.actuator(),
+        slack=slack,
+    )
     network = CableNetwork(model, names=names, signals=len(actuated), parameters=parameters)
     network.warns = warns and slack and not len(starts) and driven.size > 0
     builder.AddNamedSystem(name, network)

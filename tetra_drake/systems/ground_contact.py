@@ -25,7 +25,7 @@ from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import contact
 from tetra_drake.laws.forces import Forces, Parts, compute_ground_forces
 from tetra_drake.laws.kinematics import FORCE
-from tetra_drake.laws.mode_change import mode_margin, modes_after_step, next_mode_change
+from tetra_drake.laws.mode_change import modes_after_step, next_mode_change
 from tetra_drake.laws.model import Model
 from tetra_drake.systems.attachment import (
     Attach,
@@ -113,14 +113,10 @@ class GroundContact(ConvertibleSystem):
         # The witness function has no event: it only ends the step, and the per-step update follows.
         # A bound method in place of the lambda would keep the system alive for ever.
         this, falls = weakref.proxy(self), WitnessFunctionDirection.kPositiveThenNonPositive
-        margin = self.MakeWitnessFunction(
-            "mode margin",
-            falls,
-            lambda context: mode_margin(
-                this._parts_in(context), this._state.Eval(context), this._modes(context)
-            ),
+        keeps = self.MakeWitnessFunction(
+            "keeps its modes", falls, lambda context: -1.0 if this._is_due(context) else 1.0
         )
-        self._witnesses = [margin] if witness and modes is None else []
+        self._witnesses = [keeps] if witness and modes is None else []
         sources = {self._state.ticket(), self.xd_ticket(), self.all_parameters_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
         forces, rows, discrete = GroundContact._table, GroundContact._modes, {self.xd_ticket()}
@@ -176,6 +172,11 @@ class GroundContact(ConvertibleSystem):
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """Witness functions of the system: one with `witness`, otherwise none."""
         return self._witnesses
+
+    def _is_due(self, context: Context) -> bool:
+        """True if a mode changes at once when a step ends now."""
+        modes = self._modes(context).copy()
+        return self._update_modes(self._parts_in(context), self._state.Eval(context), modes)
 
     def _parts_in(self, context: Context) -> Parts:
         """Model and tables for the kernels, with the constants in a context."""
