@@ -51,7 +51,7 @@ class RobotOnGround:
         state = self.state(v, p)
         forces = self.meet(state)
         forces.ground_forces[:] = np.nan
-        add_ground_forces(self.model, state, self.modes, True, forces)
+        add_ground_forces(self.model, state, self.modes, forces)
         return forces.nodes, forces.ground_forces
 
     def time_to_change(self, v=REST, a=REST, p=TOUCHING) -> float:
