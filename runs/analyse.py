@@ -11,13 +11,13 @@ import contextlib
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas
-from script import measured, read_record, run_script
+from script import measured, read_record, script
 
 from tetra_drake.engines.simulate import Outcome, check_scenario, simulate_many
 from tetra_drake.errors import InputError
@@ -74,17 +74,6 @@ SPEED = "relative_speed"
 DRAWN = ("5 %", "95 %")
 """Quantiles of a gait's distances in draws of disturbances that pages show."""
 
-_FOUND = ("trial", "evaluation", "evaluations", "fitness")
-_MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
-_COLUMNS = {
-    "best_gaits": [*_FOUND, *SHOWN, SPEED, "sensitivity_in", TURNED],
-    "resimulations": ["trial", "setting", "distance_in", TURNED],
-    "unseen": ["trial", "seed", "distance_in", "met"],
-    "disturbed": ["gait", "undisturbed", *DRAWN, *_MEAN, *_KEPT, "failed", "missed"],
-}
-_NUMBERS = [*SHOWN, SPEED, "sensitivity_in", "distance_in", TURNED]
-"""Columns with numbers that may all be null."""
-
 
 @dataclass(frozen=True)
 class Analysis:
@@ -129,14 +118,12 @@ def load_analysis(directory: Path) -> Analysis:
 
 def analysis_of(content: Mapping[str, Any]) -> Analysis:
     """Analysis of the content of analysis.json."""
-    frames = []
-    for key, names in _COLUMNS.items():
-        given = ({TURNED: None} | row for row in content[key])
-        rows = [[row[name] for name in names] for row in given]
-        frame = pandas.DataFrame(rows, columns=names)
-        frames.append(frame.astype({name: float for name in names if name in _NUMBERS}))
-    best, resimulations, unseen, disturbed = frames
-    return Analysis(best.set_index("trial"), resimulations, unseen, disturbed.set_index("gait"))
+    if content["schema"] != SCHEMA:
+        raise ValueError(f"schema {content['schema']}, expected {SCHEMA}")
+    names = [field.name for field in fields(Analysis)]
+    tables = (pandas.DataFrame(content[name]).fillna(math.nan) for name in names)  # for null
+    best, again, unseen, disturbed = tables
+    return Analysis(best.set_index("trial"), again, unseen, disturbed.set_index("gait"))
 
 
 def analyse(directory: Path, *, workers: int) -> None:
@@ -254,11 +241,8 @@ def settings_of(scenario: Scenario) -> dict[str, Scenario]:
     return settings
 
 
+@script
 def main(arguments: Sequence[str]) -> None:
     """Analyses the runs of the given folders."""
     for directory in map(Path, arguments):
         analyse(directory, workers=available_cores())
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -29,7 +29,7 @@ import pandas
 from matplotlib.figure import Figure
 from page import rendered
 from records import append, read
-from script import read_settings, run_script
+from script import read_settings, script
 
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate
@@ -272,20 +272,19 @@ def _checked(solution: Any, problem: Problem, entry: Entry) -> Solution:
 # The page
 
 
-def scores(records: Sequence[Record]) -> dict[tuple[str, str], np.ndarray]:
-    """Scores by task and entry, in the order of the seeds."""
+def scores(records: Sequence[Record]) -> pandas.DataFrame:
+    """The records in the order of the seeds, with scores as a `share` of the task's best
+    interquartile mean."""
     table = pandas.DataFrame(records).sort_values("seed", kind="stable")
-    groups = table.groupby(["task", "entry"], sort=False)["score"]
-    return {place: values.to_numpy() for place, values in groups}
+    means = table.groupby(["task", "entry"])["score"].transform(interquartile_mean)
+    return table.assign(share=table["score"] / means.groupby(table["task"]).transform("max"))
 
 
 def shares(records: Sequence[Record]) -> dict[str, dict[str, np.ndarray]]:
     """Scores by entry and task, as shares of the task's best interquartile mean."""
     found: dict[str, dict[str, np.ndarray]] = {}
-    by_place = scores(records)
-    for (task, entry), values in by_place.items():
-        means = [interquartile_mean(v) for (other, _), v in by_place.items() if other == task]
-        found.setdefault(entry, {})[task] = values / float(max(means))
+    for (task, entry), own in scores(records).groupby(["task", "entry"], sort=False):
+        found.setdefault(entry, {})[task] = own["share"].to_numpy()
     return found
 
 
@@ -323,10 +322,8 @@ def scores_figure(records: Sequence[Record]) -> Figure:
 
 def means(records: Sequence[Record]) -> pandas.DataFrame:
     """Interquartile means by task and entry, with their 95 % intervals."""
-    rows = [
-        [*place, interquartile_mean(values), *interval(values, interquartile_mean)]
-        for place, values in scores(records).items()
-    ]
+    groups = scores(records).groupby(["task", "entry"], sort=False)["score"]
+    rows = [[*of, interquartile_mean(x), *interval(x, interquartile_mean)] for of, x in groups]
     table = pandas.DataFrame(rows, columns=["task", "entry", "mean", "low", "high"])
     return pandas.concat([of_task for _, of_task in table.groupby("task", sort=False)])
 
@@ -338,12 +335,13 @@ def intervals(records: Sequence[Record]) -> str:
 
 def page(records: Sequence[Record]) -> str:
     """Text of the page, from the records."""
-    settings = {"tasks": TASKS, "episodes": EPISODES, "seeds": SEEDS, "least": LEAST_SPEED}
+    settings = {"tasks": TASKS, "episodes": EPISODES, "seeds": SEEDS}
     tables: dict[str, Any] = {"table": pandas.DataFrame(records), "means": means(records)}
     tables |= {"names": entry_names(records), "shares": shares(records), "overall": overall}
     return rendered("bench.md", **settings, **tables)
 
 
+@script
 def main(files: Sequence[str]) -> None:
     """Runs the entries, and writes the page."""
     entries = [Entry.of(Path(file)) for file in files or sorted(ENTRIES.glob("*.py"))]
@@ -366,7 +364,3 @@ def main(files: Sequence[str]) -> None:
     save_figure(scores_figure(records), HERE, FIGURE, kinds=["svg"])
     write_whole(HERE / INTERVALS, intervals(records))
     write_whole(HERE / PAGE_NAME, page(records))
-
-
-if __name__ == "__main__":
-    run_script(main)

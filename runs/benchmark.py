@@ -29,11 +29,12 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from timeit import timeit
 from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import GetIntegrationSchemes, ResetIntegratorFromFlags, Simulator
-from script import chosen, read_settings, run_script
+from script import chosen, read_settings, script
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.mjcf import make_mjcf
@@ -117,14 +118,7 @@ def engines_table(scenario: Scenario, table: str) -> TextTable:
 def median_times(*runs: Callable[[], object]) -> np.ndarray:
     """Median wall time (s) of each function (functions,). They take turns in several rounds, so
     that other load on the machine affects all of them equally; a first round compiles."""
-    rounds = []
-    for _ in range(1 + GIVEN["rounds"]):
-        times = []
-        for run in runs:
-            started = time.perf_counter()
-            run()
-            times.append(time.perf_counter() - started)
-        rounds.append(times)
+    rounds = [[timeit(run, number=1) for run in runs] for _ in range(1 + GIVEN["rounds"])]
     return np.median(rounds[1:], axis=0)
 
 
@@ -362,10 +356,8 @@ def candidates_table(scenario: Scenario) -> TextTable:
     rows, count = [], GIVEN["candidates"]
     for name, step in {"its own": make_another, "with parameters": set_parameters}.items():
         step()
-        started = time.process_time()
-        for _ in range(count):
-            step()
-        rows.append([name, f"{1e3 * (time.process_time() - started) / count:.3g}"])
+        seconds = timeit(step, timer=time.process_time, number=count)
+        rows.append([name, f"{1e3 * seconds / count:.3g}"])
     return TextTable(["diagram", "CPU ms per robot"], rows)
 
 
@@ -382,11 +374,8 @@ USUAL = [*TABLES][:3]
 """Tables that are printed without names."""
 
 
+@script
 def main(names: Sequence[str], scenario: Scenario | None = None) -> None:
     """Prints the tables of the given names, or the USUAL ones. Raises InputError."""
     for name in chosen(names or USUAL, TABLES, "TABLE"):
         print(f"{TABLES[name](scenario or load_scenario('thesis')).markdown()}\n", flush=True)
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -21,7 +21,7 @@ import numpy as np
 import page
 import xarray
 from scipy.spatial.transform import Rotation
-from script import evolved, read_record, run_script
+from script import evolved, read_record, script
 from settle import difference_of_means
 
 from tetra_drake.engines.simulate import simulate
@@ -263,12 +263,9 @@ def claims(record: Mapping[str, Any]) -> str:
     return page.rendered("claims.md", **numbers, **tools)
 
 
+@script
 def main(_: Sequence[str] = ()) -> None:
     """Writes the record and prints the table."""
     check_file(MOTION)
     write_whole(MOTION, json.dumps(make_record(), indent=1, allow_nan=False) + "\n")
     print(read_record(MOTION, claims, "claims.py"))
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from page import rendered
-from script import read_settings, run_script
+from script import read_settings, script
 
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.errors import InputError, SimulationFailure
@@ -42,17 +42,10 @@ FOLDER = Path(__file__).parents[1] / "tests" / "data" / "corpus"
 MEASURED, KNOWN, PAGE = FOLDER / "measured.json", FOLDER / "known.yaml", FOLDER / "README.md"
 ENGINES = {"compiled": Compiled(), "drake": Drake(), "mujoco": Mujoco()}
 SECONDS = {"simulation.duration": 1.0, "simulation.steady_from": 0.5}
-SIZES = {
-    "bodies": "bodies",
-    "cables": "cables",
-    "mass": "mass (kg)",
-    "frequency": "lowest frequency (Hz)",
-    "speed": "speed (times real time)",
-}
-"""Numbers of a structure on the page, with their headings."""
+SIZES, OTHERS = read_settings(Path(__file__).with_suffix(".yaml")).values()
+"""Numbers of a structure on the page, and those in the table alone, with their headings."""
 MOVES = {engine: f"moves on {engine} (m)" for engine in ENGINES}
-COLUMNS = SIZES | {"states": "self-stress states", "mechanisms": "mechanisms"} | MOVES
-"""Numbers of a structure in the table, with their headings."""
+"""Headings of the greatest ways at rest."""
 
 
 def names() -> list[str]:
@@ -149,7 +142,7 @@ def tables(rows: dict[str, dict[str, Any]]) -> tuple[pd.DataFrame, pd.DataFrame]
         source = re.search(r"^# source: (.*(?:\n#   .*)*)", text, re.MULTILINE)
         about = text.splitlines()[0].removeprefix("# ")
         by = (source[1] if source else "").replace("\n#   ", " ")
-        numbers = {heading: row[key] for key, heading in COLUMNS.items()}
+        numbers = {heading: row[key] for key, heading in (SIZES | OTHERS | MOVES).items()}
         structures.append({"structure": name, "what it is": about, "source": by} | numbers)
         known += [[name, *one] for one in row["known"]]
     columns = ["structure", "quantity", "known", "ours", "by"]
@@ -167,6 +160,7 @@ def csv(table: pd.DataFrame) -> str:
     return table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
 
 
+@script
 def main(chosen: Sequence[str]) -> None:
     """Measures structures and writes the page after each."""
     rows = json.loads(MEASURED.read_text(encoding="utf-8")) if MEASURED.exists() else {}
@@ -179,7 +173,3 @@ def main(chosen: Sequence[str]) -> None:
         write_whole(FOLDER / "structures.csv", csv(structures))
         write_whole(FOLDER / "known.csv", csv(known))
         write_whole(PAGE, page(structures, known))
-
-
-if __name__ == "__main__":
-    run_script(main)

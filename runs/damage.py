@@ -23,7 +23,7 @@ import pandas
 from matplotlib.figure import Figure
 from page import rendered
 from records import append, read
-from script import read_settings, run_script
+from script import read_settings, script
 
 from tetra_drake.engines.simulate import Outcome, simulate, simulate_many
 from tetra_drake.evolution.run import load_run
@@ -212,12 +212,10 @@ def due(walks: Sequence[Row], places: np.ndarray, before: np.ndarray) -> dict[st
     for cable in ["", *scenario().whole_cables]:
         own = [row for row in walks if row["cable"] == cable]
         tried, speeds = [row["gait"] for row in own], [row["speed"] / unit for row in own]
-        if not own:
-            gaits[cable] = 0
-        elif cable:
-            gaits[cable] = next_trial(places, before, tried, speeds)
-        elif len(own) == 1:
-            gaits[cable] = int(np.argmax(before))
+        if not cable:
+            gaits[cable] = [0, int(np.argmax(before)), None][len(own)]
+        else:
+            gaits[cable] = next_trial(places, before, tried, speeds) if own else 0
     return {cable: gait for cable, gait in gaits.items() if gait is not None}
 
 
@@ -272,9 +270,9 @@ def group(cable: str) -> str:
 
 
 def outcomes(walks: Sequence[Row]) -> pandas.DataFrame:
-    """Shares of the whole robot's speed for each disturbed robot and cable: `lost` is with the old
-    gait, `best0`, `best1`, ... with the best one of so many trials, `found` after all trials.
-    `of_best` is the last one as a share of the speed of the map's fastest gait on the whole
+    """Shares of the whole robot's speed for each disturbed robot and cable, by `group`: `lost` is
+    with the old gait, `best0`, `best1`, ... with the best one of so many trials, `found` after all
+    trials. `of_best` is the last one as a share of the speed of the map's fastest gait on the whole
     robot."""
     table = pandas.DataFrame(walks)
     whole = table[table["cable"] == ""].groupby("seed")["speed"].agg(["first", "last"])
@@ -282,19 +280,17 @@ def outcomes(walks: Sequence[Row]) -> pandas.DataFrame:
     for (seed, cable), own in table[table["cable"] != ""].groupby(["seed", "cable"], sort=False):
         before, fastest = whole.loc[seed]
         best = np.maximum.accumulate(own["speed"].to_numpy() / before)
-        row = {"seed": seed, "cable": cable, "group": group(cable), "trials": len(own) - 1}
-        row |= {"lost": best[0], "found": best[-1], "of_best": best[-1] * before / fastest}
+        row = {"group": group(cable), "lost": best[0], "found": best[-1]}
+        row["of_best"] = best[-1] * before / fastest
         rows.append(row | {f"best{k}": best[min(k, len(best) - 1)] for k in counts})
     return pandas.DataFrame(rows)
 
 
 def planned(rows: Sequence[Row]) -> pandas.DataFrame:
-    """Shares of the speed by cable that a planner reaches, of the speed of the recorded gait on the
-    whole robot and of the planner's own there."""
-    gait = read(CANDIDATES)[0]["speed"]
+    """Shares by cable of the speed of the recorded gait on the whole robot that a planner
+    reaches."""
     table = pandas.DataFrame(rows).assign(group=[group(row["cable"]) for row in rows])
-    whole = table[table["cable"] == ""]["speed"].iloc[0]
-    return table.assign(share=table["speed"] / gait, own=table["speed"] / whole)
+    return table.assign(share=table["speed"] / read(CANDIDATES)[0]["speed"])
 
 
 _PLANNER: Any = {"color": "black", "marker": "x", "linestyle": "", "markersize": 4.0}
@@ -342,6 +338,7 @@ def page(walks: Sequence[Row], plan_rows: Sequence[Row], candidates: Sequence[Ro
     return rendered("damage.md", **tables, plans=planned(plan_rows), steady=steady)
 
 
+@script
 def main(_: Sequence[str] = ()) -> None:
     """Records what is missing, and writes the page and its figure."""
     find_gaits()
@@ -352,7 +349,3 @@ def main(_: Sequence[str] = ()) -> None:
     figure = speed_figure(outcomes(walks), planned(plan_rows))
     save_figure(figure, HERE, "speed", kinds=["svg"])
     write_whole(HERE / "README.md", page(walks, plan_rows, read(CANDIDATES)))
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -19,13 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas
 from matplotlib.figure import Figure
-from measured_intervals import cases, committed, kind_and_unit, measured_rise
+from measured_intervals import cases, committed, kind_and_unit
 from measured_intervals import predicted as intervals_of
 from measured_robots import (
     AXES,
     HERE,
-    JUMPS,
-    SPRING_DAMPINGS,
+    JUMPER,
     fitted_free_lengths,
     jump,
     jumper,
@@ -34,7 +33,7 @@ from measured_robots import (
     spine_poses,
 )
 from page import percent, rendered
-from script import run_script
+from script import script
 
 from tetra_drake.figures.style import (
     LINE_COLOURS,
@@ -167,11 +166,11 @@ def jump_figure(jumps: dict[float, list[tuple[float, float]]]) -> Figure:
     """Rise of the jumper over the share that is wound up."""
     figure, ((axes,),) = make_figure(width_in=5.0, height_in=3.2)
     shares = 100.0 * np.array(list(jumps))
-    for number, damping in enumerate(SPRING_DAMPINGS):
+    for number, damping in enumerate(JUMPER["dampings"]):
         rises = [results[number][0] for results in jumps.values()]
         style = line_style(number + 1)
         axes.plot(shares, rises, marker="o", label=f"springs damped by {damping:g} N s/m", **style)
-    ends = np.transpose([measured_rise(share) for share in jumps])
+    ends = np.transpose([*JUMPER["rises"].values()])
     wide: Any = {"color": "black", "linewidth": 6.0, "alpha": 0.4}
     axes.vlines(shares, *ends, **wide)
     axes.plot([], [], label="measured", **wide)
@@ -189,17 +188,15 @@ def measured_rows() -> dict[str, pandas.DataFrame]:
     spine = found["spine"]
     found["spine"] = spine[~spine["quantity"].isin(blind["quantity"])]
     anew = pandas.concat([rows for name, rows in found.items() if name.startswith("anew_")])
-    known = pandas.concat([rows for name, rows in found.items() if name in KNOWN])
+    known = pandas.concat(
+        [rows for name, rows in found.items() if not name.startswith(("anew_", "blind_"))]
+    )
     rows = {**found, "known": known, "blind": blind, "anew": anew}
     rows = {name: each.dropna(subset="measured") for name, each in rows.items()}
     return {
         name: each.reset_index(drop=True).assign(inside=holds(each).to_numpy())
         for name, each in rows.items()
     }
-
-
-KNOWN = ("simplex_loads", "simplex_frequencies", "spine", "jumps")
-"""Cases whose measured values were known when they were first predicted."""
 
 
 def of_simulations(
@@ -241,7 +238,7 @@ def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> 
     return rendered(
         "measured.md",
         **simulated,
-        measured_rises=[*JUMPS.values()],
+        rises=[*JUMPER["rises"].values()],
         rows=rows,
         totals_of=totals,
         score_of=Score.of,
@@ -252,11 +249,12 @@ def page(simulated: Mapping[str, Any], rows: Mapping[str, pandas.DataFrame]) -> 
     )
 
 
+@script
 def main(_: Sequence[str] = ()) -> None:
     """Writes the page, the numbers of simulations and the pictures."""
     rows, under_load, poses = measured_rows(), simplex_under_load(), spine_poses()
-    jumpers = [jumper(damping) for damping in SPRING_DAMPINGS]
-    jumps = {share: [jump(each, share) for each in jumpers] for share in JUMPS}
+    jumpers = [jumper(damping) for damping in JUMPER["dampings"]]
+    jumps = {share: [jump(each, share) for each in jumpers] for share in JUMPER["rises"]}
     figures = {
         "simplex": simplex_figure(under_load),
         "spine": spine_figure(poses),
@@ -270,7 +268,3 @@ def main(_: Sequence[str] = ()) -> None:
     write_whole(HERE / NUMBERS, json.dumps(simulated, indent=1) + "\n")
     write_whole(HERE / INTERVALS, table(rows["known"]))
     write_whole(HERE / "README.md", page(simulated, rows))
-
-
-if __name__ == "__main__":
-    run_script(main)

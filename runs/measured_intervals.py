@@ -17,18 +17,17 @@ import pandas
 from measured_robots import (
     AXES,
     HERE,
-    JUMPS,
-    SADDLE,
+    JUMPER,
+    LENGTHS,
     SELF_STRESSES,
-    SOFTNESS,
-    TUBE,
+    SIMPLEX,
     UPPER,
-    VIBRATING,
     compression,
     in_the_air,
     jump,
     lengthened,
     load_on_simplex,
+    load_steps,
     on_its_own,
     pose,
     stressed,
@@ -54,22 +53,12 @@ KEPT = HERE / "predictions"
 """Folder of the finished cases. A case whose file is there is not computed again."""
 SEED = 0
 
-BUCKLING, LENGTH, CABLE = 10.66e3, 2.9998, 0.502
-"""Buckling load (N) and length (m) of a tube of the simplex, and mass (kg) of a cable."""
-SAG = 0.7e-3
-"""Sag (m) of an unloaded tube under its weight."""
 _GIVEN = read_settings(HERE / "cases.yaml")
 CASES, ELEMENTS = _GIVEN["cases"], _GIVEN["elements"]
 """The cases by the names of their files in KEPT, and the simplex's cables by their names there."""
 KINDS = {word: kind for kind, words in _GIVEN["kinds"].items() for word in words}
 """Kind and unit of a quantity as a text, by its first word without number."""
 FACTS = read_json(HERE / "blind_measured.json", "measured values")
-LEAP = 6
-"""Number of sets of cable lengths from one pose of the spine that is computed to the next. Between
-them, the difference from the pose of the authors' statics is interpolated."""
-SPINE_AXIS = np.array([0.0, 0.0, 0.1785])
-TWIST = 15.0
-"""Twist (degrees) of Laika's centre vertebra at which the loads of its feet are computed."""
 
 
 Unknowns = dict[str, float]
@@ -81,7 +70,8 @@ Values = dict[str, float]
 class Case(NamedTuple):
     """Quantities of one structure that are predicted together."""
 
-    structure: str
+    given: Mapping[str, Any]
+    """Entry of CASES."""
     scenario: Callable[[], Scenario]
     unknowns: Unknowns
     """Middles of the unknown numbers."""
@@ -90,9 +80,7 @@ class Case(NamedTuple):
     table of shares."""
     predict: Callable[[Scenario, Unknowns], Values]
     """Quantities of a draw."""
-    draws: int
-    assumed: str
-    measured: Callable[[], Values] = dict
+    measured: Callable[[], Values]
     """Measured values by quantity."""
 
 
@@ -103,37 +91,36 @@ def predicted(name: str, case: Case) -> pandas.DataFrame:
     if not file.exists():
         text = made(case).to_csv(index=False, float_format="%.6g", lineterminator="\n")
         write_whole(file, text)
-    rows, measured = pandas.read_csv(file), case.measured()
-    values = [measured.get(quantity, math.nan) for quantity in rows["quantity"]]
-    return rows.assign(measured=values, assumed=case.assumed)
+    rows = pandas.read_csv(file)
+    measured = rows["quantity"].map(case.measured())
+    return rows.assign(measured=measured, assumed=case.given["assumed"])
 
 
 def made(case: Case) -> pandas.DataFrame:
     """Intervals of a case, for its file. Raises InputError if no draw is possible."""
-    scenario = case.scenario()
+    scenario, draws = case.scenario(), case.given["draws"]
     variates = variates_of(scenario.model_dump(), scenario.all_tolerances)
     every = [*variates, *case.variates]
-    errors = errors_of(every, SEED, case.draws)
+    errors = errors_of(every, SEED, draws)
     drawn = drawn_scenarios(scenario, variates, errors[:, : len(variates)])
     able = {k: each for k, each in enumerate(drawn) if isinstance(each, Scenario)}
     if not able:
         raise next(each for each in drawn if isinstance(each, InputError))
     sizes = [deviation for each in case.variates for deviation in each.deviations.values()]
     numbers = [*case.unknowns.values()] + np.array(sizes) * errors[:, len(variates) :]
-    named = [dict(zip(case.unknowns, row, strict=True)) for row in numbers.tolist()]
-    found = []
+    found = {}
     for k, each in able.items():
-        found.append(Values())
+        unknown = dict(zip(case.unknowns, numbers[k].tolist(), strict=True))
         with contextlib.suppress(InputError):  # there is no equilibrium
-            found[-1] = case.predict(each, named[k])
-    table = pandas.DataFrame(found, index=list(able)).reindex(range(case.draws))
+            found[k] = case.predict(each, unknown)
+    table = pandas.DataFrame.from_dict(found, orient="index").reindex(range(draws))
     rows, shares = intervals(every, errors, table)
     kinds, units = zip(*map(kind_and_unit, rows.index), strict=True)
-    rows.insert(0, "unit", units)
-    rows.insert(0, "kind", kinds)
-    rows.insert(0, "quantity", rows.index)
-    rows.insert(0, "structure", case.structure)
-    return rows.assign(**{"mostly from": [_most(share) for _, share in shares.iterrows()]})
+    most = [_most(share) for _, share in shares.iterrows()]
+    whole = rows.rename_axis("quantity").reset_index()
+    whole = whole.assign(structure=case.given["structure"], kind=kinds, unit=units)
+    names = ["structure", "quantity", "kind", "unit", *rows]
+    return whole[names].assign(**{"mostly from": most})
 
 
 def committed() -> pandas.DataFrame:
@@ -141,12 +128,12 @@ def committed() -> pandas.DataFrame:
     rows = pandas.read_csv(HERE / "blind.csv")
     rows.insert(2, "kind", [kind_and_unit(quantity)[0] for quantity in rows["quantity"]])
     measured = {
-        (case.structure, quantity): value
+        (case.given["structure"], quantity): value
         for case in cases().values()
         for quantity, value in case.measured().items()
     }
-    keys = zip(rows["structure"], rows["quantity"], strict=True)
-    return rows.assign(measured=[measured.get(key, math.nan) for key in keys])
+    keys = pandas.MultiIndex.from_frame(rows[["structure", "quantity"]])
+    return rows.assign(measured=keys.map(measured))
 
 
 def kind_and_unit(quantity: str) -> tuple[str, str]:
@@ -170,8 +157,9 @@ def bowed(longer: Callable[[float], Scenario], unknown: Unknowns, self_stress: f
 
     A tube that is bowed by a at no load is shorter by pi^2 a^2 / 4 l / (1 - P / Pcr)^2.
     """
-    least = (math.pi * math.hypot(SAG, unknown["bow of the tubes"])) ** 2 / (4.0 * LENGTH)
-    critical = BUCKLING * (1.0 + unknown["buckling load"])
+    bow = math.hypot(SIMPLEX["sag"], unknown["bow of the tubes"])
+    least = (math.pi * bow) ** 2 / (4.0 * SIMPLEX["tube_length"])
+    critical = SIMPLEX["buckling"] * (1.0 + unknown["buckling load"])
 
     def shortening(force: float) -> float:
         return least / (1.0 - force / critical) ** 2 - least / (1.0 - self_stress / critical) ** 2
@@ -182,7 +170,7 @@ def bowed(longer: Callable[[float], Scenario], unknown: Unknowns, self_stress: f
         now, before = compression(robot), shorter
         shorter = shortening(
             brentq(
-                lambda x, p, d: shortening(x) - d - SOFTNESS * (p - x),
+                lambda x, p, d: shortening(x) - d - SIMPLEX["softness"] * (p - x),
                 -critical,
                 critical * (1.0 - 1e-6),
                 args=(now, before),
@@ -213,7 +201,7 @@ def prestressed(
     """A simplex with a self-stress (kN) as far as it is known, how much longer its tubes are for
     that (m), and its self-stress in N."""
     wanted = 1e3 * self_stress + unknown["self-stress"]
-    first = SOFTNESS * wanted + 0.6e-3  # longer than any error of the lengths
+    first = SIMPLEX["softness"] * wanted + 0.6e-3  # longer than any error of the lengths
     return *stressed(scenario, wanted, first=first, within=2.0), wanted
 
 
@@ -250,14 +238,10 @@ def simplex_tests(
 
 def loads_measured(file: str, loads: Sequence[float], means: bool, **_: Any) -> Values:
     """Measured heights and forces of the simplex under loads; see simplex_tests()."""
-    table = pandas.read_csv(HERE / file)
-    table = table[table["quantity"] != "angle"]
-    names = table["element"].str[:-1] if means else table["element"]
-    found: Values = {}
-    at = table.groupby("step")["x"].mean()
+    steps, found = load_steps(file), Values()
     for load in loads:
-        step = (at - load).abs().idxmin()
-        values = table[table["step"] == step].groupby(names)["value"].mean()
+        nearest = min(steps, key=lambda step: abs(step[0] - load))[1]
+        values = nearest.groupby("kind" if means else "element")["value"].mean()
         found |= {f"{name} at {load:.2f} kN": value for name, value in values.items()}
     return found
 
@@ -288,9 +272,9 @@ def simplex_frequencies(
         bars = [(mode[a], mode[b]) for a, b in structure.struts["tube"].pairs]
         ropes = [tuple(map(mode.__getitem__, cable.split()[1:])) for cable in study.cables.index]
         masses = structure_of(study.robot.scenario).masses
-        moving = sum(masses[node] * mode[node] @ mode[node] for node in VIBRATING)
-        moving += TUBE / 3.0 * sum(a @ a + a @ b + b @ b for a, b in bars)
-        less = CABLE / 6.0 * sum((a - b) @ (a - b) for a, b in ropes)
+        moving = sum(masses[node] * mode[node] @ mode[node] for node in SIMPLEX["vibrating"])
+        moving += SIMPLEX["tube"] / 3.0 * sum(a @ a + a @ b + b @ b for a, b in bars)
+        less = SIMPLEX["cable"] / 6.0 * sum((a - b) @ (a - b) for a, b in ropes)
         stiffer = (1.0 + unknown["supports that stick"]) * (1.0 + unknown["bending at joints"])
         factor = stiffer * (1.0 + unknown["rest of the model"]) / math.sqrt(1.0 - less / moving)
         frequency = study.frequencies[0] * factor / math.sqrt(1.0 + unknown["masses in motion"])
@@ -312,24 +296,21 @@ def spine_tests() -> pandas.DataFrame:
     return pandas.concat([pandas.read_csv(HERE / file) for file in files])
 
 
-def spine_path(scenario: Scenario, unknown: Unknowns) -> Values:
+def spine_path(scenario: Scenario, unknown: Unknowns, leap: int) -> Values:
     """Mean and range of the spine's poses on a path of cable lengths, as a camera sees them, for
-    each test."""
+    each test. One in `leap` sets of lengths is computed, and the last one."""
     poses = spine_tests()
     tests = poses["test"].unique().tolist()
     table = poses[poses["test"] == tests[0]]
     wanted = table[[f"wanted_{column}" for column, _ in AXES.values()]].to_numpy()
     ways = np.gradient(wanted[:, :2], axis=0)
-    steps = [*range(0, len(table) - 1, LEAP), len(table) - 1]
+    steps = [*range(0, len(table) - 1, leap), len(table) - 1]
     differences = []
     for step in steps:
-        changes: dict[str, object] = {}
-        for number, cable in enumerate(SADDLE, start=1):
-            length = table[f"l{number}_m"].iloc[step] + unknown[f"winding:{number}"]
-            changes[f"robot.cables.{cable}.free_length"] = f"{float(length)!r} m"
+        lengths = table[LENGTHS].iloc[step] + [unknown[f"winding:{i}"] for i in range(1, 5)]
         x, z = -unknown["friction"] * ways[step] / np.linalg.norm(ways[step])
-        changes["robot.loads.c"] = [f"{float(x)!r} N", "0 N", f"{float(z)!r} N"]
-        differences.append(pose(scenario.with_changes(changes)) - wanted[step])
+        rubbed = {"robot.loads.c": [f"{float(x)!r} N", "0 N", f"{float(z)!r} N"]}
+        differences.append(pose(scenario.with_changes(rubbed), lengths) - wanted[step])
     between = [np.interp(range(len(table)), steps, each) for each in np.transpose(differences)]
     seen = (wanted + np.transpose(between)) / [size for _, size in AXES.values()]
     values: Values = {}
@@ -341,7 +322,7 @@ def spine_path(scenario: Scenario, unknown: Unknowns) -> Values:
     return values
 
 
-def spine_measured() -> Values:
+def spine_measured(**_: Any) -> Values:
     """Measured mean and range of the spine's poses in each test."""
     found: Values = {}
     for axis, (column, size) in AXES.items():
@@ -357,23 +338,17 @@ def spine_measured() -> Values:
 def jumper_rises(scenario: Scenario, unknown: Unknowns) -> Values:
     """Rises of the jumper's centre by the share that is wound up. A motion that fails has none."""
     values: Values = {}
-    for share in JUMPS:
+    for share in JUMPER["rises"]:
         with contextlib.suppress(SimulationFailure):
             rise, _ = jump(scenario, share + unknown["wound up"])
             values[f"rise at {100.0 * share:.0f} %"] = rise
     return values
 
 
-def measured_rise(share: float) -> list[float]:
-    """Least and greatest measured rise (m) of the jumper by the share that is wound up."""
-    return [float(end) for end in JUMPS[share].split(" to ")]
-
-
 def jumps_measured() -> Values:
     """Middles of the measured ranges of the jumper's rises."""
-    return {
-        f"rise at {100.0 * share:.0f} %": float(np.mean(measured_rise(share))) for share in JUMPS
-    }
+    rises = JUMPER["rises"].items()
+    return {f"rise at {100.0 * share:.0f} %": float(np.mean(ends)) for share, ends in rises}
 
 
 def of_its_file(name: str) -> Scenario:
@@ -401,18 +376,14 @@ def rest_measured() -> Values:
 # The hexagonal prism, and Laika
 
 
-def prism_frequencies(scenario: Scenario, unknown: Unknowns) -> Values:
+def prism_frequencies(scenario: Scenario, unknown: Unknowns, modes: int) -> Values:
     """Natural frequencies of the hexagonal prism, ascending."""
-    frequencies = study_equilibrium(Robot.of(scenario)).frequencies[:MODES]
+    frequencies = study_equilibrium(Robot.of(scenario)).frequencies[:modes]
     factor = 1.0 + unknown["rest of the model"]
     return {f"frequency {i}": x * factor for i, x in enumerate(frequencies.tolist(), start=1)}
 
 
-MODES = 9
-"""Number of modes of the hexagonal prism below 14 Hz."""
-
-
-def measured_peaks() -> Values:
+def measured_peaks(**_: Any) -> Values:
     """Measured natural frequencies of the prism, each at another one of the modes: all together as
     near to the predicted medians as they can be."""
     peaks = np.array(FACTS["hex_prism_peaks_hz"])
@@ -427,17 +398,25 @@ def measured_lifts(**_: Any) -> Values:
     return {f"lift of the {name} foot": abs(mean) for name, (mean, _) in lifts.items()}
 
 
-def twisted(scenario: Scenario, degrees: float) -> Scenario:
-    """Laika with half B of its centre vertebra turned about the spine."""
+def twisted(scenario: Scenario, degrees: float, axis: np.ndarray) -> Scenario:
+    """Laika with half B of its centre vertebra turned about the spine, whose axis goes
+    through a place."""
     turn, changes = Rotation.from_euler("y", degrees, degrees=True), dict[str, object]()
     for node, place in structure_of(scenario).nodes.items():
         if "/tB/" in node:
-            turned = turn.apply(np.array(place) - SPINE_AXIS) + SPINE_AXIS
+            turned = turn.apply(np.array(place) - axis) + axis
             changes[f"robot.nodes.{node}"] = [f"{v!r} m" for v in turned.tolist()]
     return scenario.with_changes(changes)
 
 
-def laika_lifts(scenario: Scenario, unknown: Unknowns, feet: Mapping[str, Any]) -> Values:
+def laika_lifts(
+    scenario: Scenario,
+    unknown: Unknowns,
+    *,
+    feet: Mapping[str, Any],
+    twist: float,
+    axis: Sequence[float],
+) -> Values:
     """Twists of Laika's centre vertebra (degrees) at which its feet lift. `feet` are by node: names
     of the foot and of its mirror image, whose test is the mirror image, sense of the twist that
     lifts the foot, and its side.
@@ -467,9 +446,9 @@ def laika_lifts(scenario: Scenario, unknown: Unknowns, feet: Mapping[str, Any]) 
             law["free_length"] = f"{free!r} m"
             changes |= {f"robot.cables.{name}.{key}": value for key, value in law.items()}
         bent = drawn.with_changes(changes)
-        twists = [twisted(bent, twist) for twist in (0.0, sense * TWIST)]
+        twists = [twisted(bent, each, np.array(axis)) for each in (0.0, sense * twist)]
         rest, less = (study_equilibrium(Robot.of(one)).nodes.loc[foot, "load"] for one in twists)
-        lift = (rest - unknown["load that is seen"]) * TWIST / (rest - less)
+        lift = (rest - unknown["load that is seen"]) * twist / (rest - less)
         lift = lift * (1.0 + unknown["rest of the model"]) if rest > less else math.nan
         values |= {f"lift of the {name} foot": lift for name in names}
     return values
@@ -503,13 +482,11 @@ def case_of(name: str, **settings: Any) -> Case:
             unknowns[name] = middle
             variates.append(Variate(of_all, law, {name: deviation}))
     return Case(
-        given["structure"],
+        given,
         partial(make, given["robot"]),
         unknowns,
         variates,
         partial(predict, **further),
-        given["draws"],
-        given["assumed"],
         partial(measured, **further),
     )
 

@@ -4,10 +4,12 @@ jumps, without a fitted constant."""
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas
+from script import read_settings
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.fit.fit import Fit, fit
@@ -27,36 +29,16 @@ from tetra_drake.settings.section import value_at
 
 HERE = Path(__file__).parent / "measured"
 
-SOFTNESS = 0.717e-3 / 1.5e3
-"""Lengthening (m) of the simplex's struts per self-stress (N), as published; nearly linear."""
+SIMPLEX, SPINE, JUMPER = read_settings(HERE / "robots.yaml").values()
+"""What is known of the robots, see the file."""
 SELF_STRESSES = dict(pandas.read_csv(HERE / "simplex_frequencies.csv").to_numpy().tolist())
 """Measured first frequency (Hz) of the simplex by its self-stress (kN)."""
-TUBE, GRAVITY = 2.63, 9.81
-"""Mass (kg) of a strut of the simplex, and acceleration of gravity (m/s²)."""
-VIBRATING = {"n0": 45.7, "n1": 45.7, "n2": 45.7, "n3": 50.3, "n4": 50.3, "n5": 50.3}
-"""Weights (N) at the nodes of the simplex in the tests of its frequency, half a strut included."""
-
 UPPER = ("n3", "n4", "n5")
 """Upper nodes of the simplex, which are loaded."""
-HEIGHT_UNCERTAINTY = 2e-4
-"""Standard deviation (m) of a measured height."""
-
-SADDLE = ("horizontal_bottom", "horizontal_top", "saddle_bottom", "saddle_top")
-"""Cables of the spine, in the order of its measurements."""
 AXES = {"x": ("x_m", 1e-3), "y": ("y_m", 1e-3), "angle": ("rad", math.radians(1.0))}
 """Columns of the measured poses, and their units (mm, degrees) on the page."""
-CENTRE, FLOOR = 0.0291, 0.3
-"""Distance (m) of the spine's node c behind the origin of its pose, and height (m) of the origin in
-spine.yaml."""
-
-UNWOUND, RELEASED = 0.5816, 0.75
-"""Free lengths (m) of the jumper's actuators before it is wound up, and after the release."""
-WIND, HOLD = 5.5, 6.0
-"""Times (s) at which the jumper is wound up, and released."""
-SPRING_DAMPINGS = (2.0, 0.5)
-"""Damping of the jumper's springs in N s/m: NTRT's, and a quarter of it."""
-JUMPS = {0.2: "0.28 to 0.36", 0.3: "0.45 to 0.52", 0.4: "0.61 to 0.98", 0.46: "1.06 to 1.14"}
-"""Measured rise (m) of the jumper's centre by the share of UNWOUND that is wound up."""
+LENGTHS = ["l1_m", "l2_m", "l3_m", "l4_m"]
+"""Columns of the cable lengths."""
 
 
 def on_its_own(name: str, **changes: str) -> Scenario:
@@ -110,7 +92,7 @@ def stressed(
     lengthening, scenario = first, lengthened(bare, first)
     found = compression(Robot.of(scenario)) if first else 0.0
     while abs(self_stress - found) > within:
-        lengthening += SOFTNESS * (self_stress - found)
+        lengthening += SIMPLEX["softness"] * (self_stress - found)
         scenario = lengthened(bare, lengthening)
         found = compression(Robot.of(scenario))
     return scenario, lengthening
@@ -126,11 +108,12 @@ def load_on_simplex(load: float) -> dict[str, list[str]]:
     return {f"robot.loads.{node}": ["0 N", "0 N", f"{-1e3 * float(load)!r} N"] for node in UPPER}
 
 
-def load_steps(*quantities: str) -> list[tuple[float, pandas.DataFrame]]:
-    """Loads (kN) per upper node of the simplex's test, with the quantities measured at each."""
-    measured = pandas.read_csv(HERE / "simplex_loading.csv")
-    measured["kind"] = measured["element"].str[:-1].where(measured["quantity"] != "height", "H")
-    steps = measured[measured["quantity"].isin(quantities)].groupby("step")
+def load_steps(file: str = "simplex_loading.csv") -> list[tuple[float, pandas.DataFrame]]:
+    """Loads (kN) per upper node in a test of the simplex, with the heights and forces measured at
+    each. Column "kind": H, or the kind of cables or struts."""
+    measured = pandas.read_csv(HERE / file)
+    measured["kind"] = measured["element"].str[:-1]
+    steps = measured[measured["quantity"] != "angle"].groupby("step")
     return [(max(0.0, of_step["x"].mean()), of_step) for _, of_step in steps]
 
 
@@ -139,7 +122,7 @@ def simplex_under_load() -> pandas.DataFrame:
     node: predicted and measured means, with the measured least and greatest."""
     stressed, rows = simplex(1.5), []
     groups = {"CB": "bottom", "CT": "top", "CV": "vertical"}
-    for load, of_step in load_steps("height", "force"):
+    for load, of_step in load_steps():
         study = study_equilibrium(Robot.of(stressed.with_changes(load_on_simplex(load))))
         tension = study.cables.groupby("group")["tension"].mean() / 1e3
         predicted = {"H": 1e3 * study.nodes.loc[[*UPPER], "z"].mean()}
@@ -155,12 +138,13 @@ def simplex_under_load() -> pandas.DataFrame:
 
 def simplex_heights(most_load: float = 1.01) -> list[Rest]:
     """Measured mean heights of the upper nodes, up to a load (kN) per node, for a fit."""
-    means = [(load, of_step["value"].mean()) for load, of_step in load_steps("height")]
+    heights = [of_step[of_step["kind"] == "H"] for _, of_step in load_steps()]
+    means = [(max(0.0, each["x"].mean()), each["value"].mean()) for each in heights]
     return [
         Rest(
             changes=load_on_simplex(load),
             positions={f"{node} z": height / 1e3 for node in UPPER},
-            position_uncertainty=HEIGHT_UNCERTAINTY,
+            position_uncertainty=SIMPLEX["height_uncertainty"],
         )
         for load, height in means
         if load <= most_load
@@ -177,10 +161,11 @@ def vibrating(scenario: Scenario) -> Scenario:
     """A simplex with the masses of the tests of its frequency."""
     structure = structure_of(scenario)
     tube = structure.struts["tube"]
-    density = TUBE / (math.pi * (tube.diameter / 2) ** 2 * structure.size)
+    density = SIMPLEX["tube"] / (math.pi * (tube.diameter / 2) ** 2 * structure.size)
     changes = {"robot.struts.tube.density": f"{density!r} kg/m^3"}
-    for node, weight in VIBRATING.items():
-        changes[f"robot.masses.{node}"] = f"{weight / GRAVITY - TUBE / 2!r} kg"
+    for node, weight in SIMPLEX["vibrating"].items():
+        mass = weight / SIMPLEX["gravity"] - SIMPLEX["tube"] / 2
+        changes[f"robot.masses.{node}"] = f"{mass!r} kg"
     return scenario.with_changes(changes)
 
 
@@ -192,23 +177,22 @@ def simplex_frequency(self_stress: float) -> float:
 # The spine
 
 
-def pose(scenario: Scenario) -> list[float]:
-    """Pose of the spine's vertebra at rest: x and y in m, and the angle in rad."""
-    nodes = at_rest(Robot.of(scenario))
+def pose(spine: Scenario, lengths: Sequence[float]) -> list[float]:
+    """Pose of the spine's vertebra at rest, with these cable lengths (m): x and y in m, and the
+    angle in rad."""
+    named = zip(SPINE["cables"], lengths, strict=True)
+    changes = {f"robot.cables.{cable}.free_length": f"{float(x)!r} m" for cable, x in named}
+    nodes = at_rest(Robot.of(spine.with_changes(changes)))
     along = nodes["f"] - nodes["c"]
-    origin = nodes["c"] + CENTRE * along / np.linalg.norm(along)
-    return [origin[0], origin[2] - FLOOR, math.atan2(along[2], along[0])]
+    origin = nodes["c"] + SPINE["behind"] * along / np.linalg.norm(along)
+    return [origin[0], origin[2] - SPINE["origin"], math.atan2(along[2], along[0])]
 
 
 def spine_poses() -> pandas.DataFrame:
     """Poses of the spine's vertebra for each measured set of cable lengths: predicted ones, wanted
     ones by the authors' statics, and ones that their camera measured; in m and rad."""
     table, scenario = pandas.read_csv(HERE / "spine_poses.csv"), in_the_air("spine")
-    poses = []
-    for lengths in table[["l1_m", "l2_m", "l3_m", "l4_m"]].to_numpy().tolist():
-        named = zip(SADDLE, lengths, strict=True)
-        changes = {f"robot.cables.{cable}.free_length": f"{x!r} m" for cable, x in named}
-        poses.append(pose(scenario.with_changes(changes)))
+    poses = [pose(scenario, lengths) for lengths in table[LENGTHS].to_numpy()]
     table[["predicted_x_m", "predicted_y_m", "predicted_rad"]] = poses
     return table
 
@@ -224,16 +208,16 @@ def jumper(damping: float) -> Scenario:
 
 def jump(scenario: Scenario, share: float) -> tuple[float, float]:
     """Rise (m) of the jumper's centre, and the least distance (m) of two rods' axes. The actuators
-    are wound up slowly by a share of UNWOUND and let go at once."""
+    are wound up slowly by a share of their free length and let go at once."""
     result = simulate(scenario, command=wound_up(scenario, share), record=True)
-    height = result.trajectory.p_WB.sel(axis="z").mean("body")
-    rise = height.sel(time=slice(HOLD, None)).max() - height.sel(time=HOLD, method="nearest")
+    height, begin = result.trajectory.p_WB.sel(axis="z").mean("body"), JUMPER["hold"]
+    rise = height.sel(time=slice(begin, None)).max() - height.sel(time=begin, method="nearest")
     return float(rise), result.metrics.clearance
 
 
 def wound_up(scenario: Scenario, share: float) -> Command:
-    """Command that winds the actuators up by a share of UNWOUND and releases them."""
+    """Command that winds the actuators up by a share of their free length and releases them."""
     times = np.arange(0.0, scenario.simulation.duration, 0.01)
-    wound = UNWOUND * (1.0 - share * np.minimum(times / WIND, 1.0))
-    free_length = np.where(times < HOLD, wound, RELEASED)
+    wound = JUMPER["unwound"] * (1.0 - share * np.minimum(times / JUMPER["wind"], 1.0))
+    free_length = np.where(times < JUMPER["hold"], wound, JUMPER["released"])
     return Command("wound up and released", 0.01, np.tile(free_length[:, np.newaxis], 3))

@@ -26,7 +26,7 @@ from matplotlib.figure import Figure
 from page import rendered
 from record import SCRATCH, load_experiments
 from records import append, read
-from script import evolved, measured, run_script
+from script import evolved, measured, script
 from sine import PERIOD, load_sines, peak, steady_signals
 
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -204,6 +204,7 @@ def page(found: dict[str, Any]) -> str:
     return rendered("oscillators.md", **rows, sine=farthest, peak=PEAK)
 
 
+@script
 def main(names: Sequence[str]) -> None:
     """Makes what is missing, and writes the page."""
     done = {one["experiment"] for one in read(HERE / RECORDS)}
@@ -219,7 +220,3 @@ def main(names: Sequence[str]) -> None:
         write_whole(HERE / IMITATION, json.dumps(imitation(found)) + "\n")
     save_figure(trials_figure(found, farthest_sine(found)), HERE, "trials", kinds=["svg"])
     write_whole(HERE / "README.md", page(found))
-
-
-if __name__ == "__main__":
-    run_script(main)

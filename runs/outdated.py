@@ -23,7 +23,7 @@ import numpy as np
 from analyse import ROUNDINGS, sensitivity
 from parting import asked, made
 from record import EXPERIMENTS, HERE, Experiment
-from script import chosen, run_script
+from script import chosen, script
 
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import evaluate_all, evaluator_of
@@ -96,6 +96,7 @@ def goes_elsewhere(run: Run, index: int, before: float, now: float) -> bool:
     return not apart <= ROUNDINGS * change
 
 
+@script
 def main(names: Sequence[str]) -> None:
     """Prints what is outdated of the experiments of the given names, or of all. Raises
     InputError."""
@@ -106,7 +107,3 @@ def main(names: Sequence[str]) -> None:
         outdated += [name] if reason else []
     if outdated:
         print(f"record again: python runs/record.py {' '.join(outdated)}")
-
-
-if __name__ == "__main__":
-    run_script(main)

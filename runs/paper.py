@@ -17,7 +17,7 @@ from corpus import ENGINES
 from corpus import MEASURED as CORPUS
 from measured import Score, measured_rows, totals
 from page import rendered
-from script import read_settings, run_script
+from script import read_settings, script
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_json, write_whole
@@ -66,11 +66,8 @@ def paper() -> str:
     )
 
 
+@script
 def main(_: Sequence[str] = ()) -> None:
     """Writes the paper."""
     write_whole(PAGE, paper())
     print(PAGE)
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -20,16 +20,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from planning_page import (
-    EPISODES,
     FILM,
+    GIVEN,
     GROUPS,
     HERE,
-    NEAR,
-    PILLAR,
     RECORDS,
     Record,
     centre_of,
@@ -38,8 +37,8 @@ from planning_page import (
     write_page,
 )
 from records import append
-from scipy.ndimage import map_coordinates
-from script import chosen, evolved, run_script
+from scipy.ndimage import generate_binary_structure, map_coordinates, minimum_filter
+from script import chosen, evolved, script
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.planner import Planner
@@ -53,17 +52,8 @@ from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
-PLANNING, GAIT = EPISODES["planner"], EPISODES["gait"]
-"""Arguments of the planner, and what differs where it begins with a gait."""
-MODEL = "!Compiled {tolerance: 10 mm/s, max_step: 10 ms}"
-"""Engine of the planner's model. Its tolerance is a hundred times coarser than the robot's."""
-
-FAR, MARGIN = 3.0, 0.15
-"""Distance of the goals from the start, and distance from pillars that costs nothing, in m."""
-PENALTY = 10.0
-"""Cost per metre of reaching into a pillar or its margin, at the worst time of the horizon."""
-APART, SLOW = 0.65, 4.0
-"""Distance (m) of the centre from pillars where it is in their way, and factor of ways there."""
+GAIT = GIVEN["gait"]
+"""What differs where the planner begins with a gait."""
 GRID = np.linspace(-7.0, 7.0, 141)
 """Places (m) in both directions of the map of ways."""
 SCRATCH = Path("out/planning")
@@ -76,31 +66,31 @@ def clearance(p_WN: np.ndarray, pillars: Sequence[Sequence[float]]) -> np.ndarra
     centre = centre_of(p_WN)
     reach = np.linalg.norm(p_WN[..., :2] - centre[..., np.newaxis, :], axis=-1).max(axis=-1)
     away = np.linalg.norm(centre[..., np.newaxis, :] - np.asarray(pillars), axis=-1).min(axis=-1)
-    return np.asarray(away - reach - PILLAR)
+    return np.asarray(away - reach - GIVEN["pillar"])
 
 
 def way_field(goal: Sequence[float], pillars: Sequence[Sequence[float]]) -> np.ndarray:
     """Ways (m) to a goal around pillars, on the GRID in both directions. A metre that is nearer to
-    a pillar than APART counts as SLOW ones."""
+    a pillar than `apart` counts as `slow` ones."""
     x, y = np.meshgrid(GRID, GRID, indexing="ij")
     away = np.min([np.hypot(x - px, y - py) for px, py in pillars], axis=0)
-    pace = float(GRID[1] - GRID[0]) * np.where(away < APART, SLOW, 1.0)
+    pace = float(GRID[1] - GRID[0]) * np.where(away < GIVEN["apart"], GIVEN["slow"], 1.0)
     field = np.full(x.shape, math.inf)
     field[np.abs(GRID - goal[0]).argmin(), np.abs(GRID - goal[1]).argmin()] = 0.0
-    sides = [(i, j) for i in (0, 1, 2) for j in (0, 1, 2)]
     before = np.zeros_like(field)
+    nearest = partial(minimum_filter, mode="constant", cval=math.inf)
     while (field != before).any():
-        before, around = field, np.pad(field, 1, constant_values=math.inf)
-        for i, j in sides:
-            there = around[i : i + len(GRID), j : j + len(GRID)]
-            field = np.minimum(field, there + math.hypot(i - 1, j - 1) * pace)
+        before = field
+        beside = nearest(field, footprint=generate_binary_structure(2, 1)) + pace
+        across = nearest(field, size=3) + math.sqrt(2.0) * pace
+        field = np.minimum(field, np.minimum(beside, across))
     return field
 
 
 @dataclass
 class Way:
     """Cost: way (m) of the centre to the next place after the horizon, around the pillars. Circles
-    around the robot that come too near to pillars cost PENALTY."""
+    around the robot that come too near to pillars cost extra."""
 
     places: Sequence[Sequence[float]]
     pillars: Sequence[Sequence[float]] = ()
@@ -116,8 +106,8 @@ class Way:
             return np.asarray(np.linalg.norm(ends - np.asarray(self.places[self.passed]), axis=-1))
         at = (ends.T - GRID[0]) / (GRID[1] - GRID[0])
         cost = map_coordinates(self.fields[self.passed], at, order=1, mode="nearest")
-        missing = np.maximum(0.0, MARGIN - clearance(readings.p_WN, self.pillars))
-        return np.asarray(cost + PENALTY * missing.max(axis=0))
+        missing = np.maximum(0.0, GIVEN["margin"] - clearance(readings.p_WN, self.pillars))
+        return np.asarray(cost + GIVEN["penalty"] * missing.max(axis=0))
 
     def found(self, p_WN: np.ndarray) -> Record:
         """What its record has, of nodes (times, nodes, 3): places, pillars and least clearance."""
@@ -127,7 +117,7 @@ class Way:
     def is_done(self, readings: Readings) -> bool:
         """True if the robot is at the last place of its way."""
         away = centre_of(readings.p_WN) - np.asarray(self.places[self.passed])
-        at_place = bool(np.linalg.norm(away) < NEAR)
+        at_place = bool(np.linalg.norm(away) < GIVEN["near"])
         is_last = self.passed == len(self.places) - 1
         self.passed += at_place and not is_last
         return at_place and is_last
@@ -176,43 +166,13 @@ class Turn:
 Task = Way | Ahead | Turn
 
 
-@dataclass(frozen=True)
-class Episode:
-    """A robot, and what it has to do: to go to a goal or to places around pillars, to turn, or to
-    go ahead."""
-
-    group: str
-    name: str
-    base: str = "rover"
-    """Name of a shipped scenario."""
-    plant: str = "compiled"
-    """Engine of the robot, see EPISODES."""
-    ground: str = "level"
-    """Ground of robot and model, see EPISODES."""
-    degrees: float = 0.0
-    friction: float | None = None
-    """Slope of an incline, and coefficient of friction there, at rest and in motion."""
-    goal: float | None = None
-    """Direction (degrees) of a goal."""
-    places: Sequence[Sequence[float]] = ()
-    pillars: Sequence[Sequence[float]] = ()
-    turn: float | None = None
-    """Heading (degrees) of a row at the end."""
-    steady: str = "0 s"
-    """Time from which the speed counts."""
-    most: float = 60.0
-    """Time (s) after which the episode ends."""
-    seed: int = 0
-    """Seed of the planner's noise."""
-    is_disturbed: bool = False
-    """True for a draw of disturbances for each goal."""
-    climbs: bool = False
-    """True if the plans change the commands of a gait."""
+class Episode(SimpleNamespace):
+    """An entry of `episodes` in the file, with what differs from the `defaults` there."""
 
     @property
     def settings(self) -> dict[str, Any]:
         """Arguments of the planner after the cost, without the command."""
-        return PLANNING | {"seed": self.seed} | (GAIT["planner"] if self.climbs else {})
+        return GIVEN["planner"] | {"seed": self.seed} | (GAIT["planner"] if self.climbs else {})
 
     def task(self) -> Task:
         """What the robot has to do."""
@@ -220,30 +180,29 @@ class Episode:
             return Turn(math.radians(self.turn))
         if self.goal is not None:
             angle = math.radians(self.goal)
-            return Way([(FAR * math.cos(angle), FAR * math.sin(angle))])
+            return Way([(GIVEN["far"] * math.cos(angle), GIVEN["far"] * math.sin(angle))])
         return Way(self.places, self.pillars) if self.places else Ahead()
 
     def scenarios(self) -> tuple[Scenario, Scenario]:
         """Scenarios of the robot and of the planner's model."""
         changes = {"simulation.steady_from": self.steady, "simulation.duration": f"{self.most} s"}
-        changes |= EPISODES["grounds"][self.ground] | (GAIT["row"] if self.climbs else {})
+        changes |= GIVEN["grounds"][self.ground] | (GAIT["row"] if self.climbs else {})
         if self.friction is not None:
             changes |= uphill(self.degrees, self.friction)
         scenario = load_scenario(self.base).with_changes(changes)
-        plant = scenario.with_changes(EPISODES["engines"][self.plant])
+        plant = scenario.with_changes(GIVEN["engines"][self.plant])
         if self.is_disturbed and self.goal is not None:
             draw = round(self.goal / 18.0)
             plant = plant.with_sections(disturbances=default_disturbances(plant))
             plant = disturbed(plant, fresh_draws(plant, 0, draw + 1)[draw])
-        return plant, scenario.with_changes({"engine": MODEL})
+        return plant, scenario.with_changes({"engine": GIVEN["model"]})
 
 
 def all_episodes() -> list[Episode]:
     """All episodes, in the order of the file: one for each combination of the values in `each`."""
     episodes = []
-    for row in EPISODES["episodes"]:
-        common = {key: value for key, value in row.items() if key != "each"}
-        each = row.get("each", {})
+    for row in GIVEN["episodes"]:
+        common, each = GIVEN["defaults"] | row, row.get("each", {})
         for values in itertools.product(*each.values()):
             given = common | dict(zip(each, values, strict=True))
             episodes.append(Episode(**given | {"name": row["name"].format(**given)}))
@@ -339,6 +298,7 @@ def run_all(episodes: Sequence[Episode], folder: Path) -> None:
         print(f"{episode.group}, {episode.name}: {done}, {record['time']:.1f} s, {cost:.2f} s CPU")
 
 
+@script
 def main(groups: Sequence[str], folder: Path = HERE) -> None:
     """Runs the episodes of groups, or all, films the slalom, and writes the page. Raises
     InputError."""
@@ -348,7 +308,3 @@ def main(groups: Sequence[str], folder: Path = HERE) -> None:
         (slalom,) = (each for each in episodes if each.name == "slalom")
         film(run_episode(slalom)[1], slalom.pillars, folder / FILM)
     write_page(folder, episodes)
-
-
-if __name__ == "__main__":
-    run_script(main)

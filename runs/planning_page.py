@@ -25,12 +25,10 @@ from tetra_drake.results.result import SimulationResult
 
 HERE = Path(__file__).parent / "planning"
 RECORDS, FILM = "records.jsonl", "slalom.gif"
-EPISODES: dict[str, Any] = read_settings(HERE / "episodes.yaml")
+GIVEN: dict[str, Any] = read_settings(HERE / "episodes.yaml")
 """What is run, see the file."""
-GROUPS = [*dict.fromkeys(row["group"] for row in EPISODES["episodes"])]
+GROUPS = [*dict.fromkeys(row["group"] for row in GIVEN["episodes"])]
 """Groups of episodes, in the order of the runs."""
-NEAR, PILLAR = 0.3, 0.1
-"""Distance (m) of the centre from a goal that is reached, and radius (m) of pillars."""
 FRAME, COLOURS = 0.2, 12
 """Time between the film's pictures in s, and number of their colours."""
 VIEW, TALL = math.radians(40.0), 0.6
@@ -91,7 +89,9 @@ def _seen(points: np.ndarray) -> np.ndarray:
 def draw_pillar(axes: Axes, x: float, y: float, *, zorder: float) -> None:
     """Draws a pillar at a place, seen obliquely."""
     around = np.linspace(0.0, math.tau, 40)
-    ring = np.stack([x + PILLAR * np.cos(around), y + PILLAR * np.sin(around)], axis=-1)
+    ring = np.stack(
+        [x + GIVEN["pillar"] * np.cos(around), y + GIVEN["pillar"] * np.sin(around)], axis=-1
+    )
     low, high = (_seen(np.pad(ring, ((0, 0), (0, 1)), constant_values=z)) for z in (0.0, TALL))
     outline = np.vstack([low[20:], high[:21]])
     axes.fill(*outline.T, color="C1", zorder=zorder)
@@ -105,9 +105,9 @@ def draw_way(axes: Axes, record: Record) -> None:
     """Draws the path of an episode, with circles around the places to pass and at the pillars."""
     axes.plot(*np.transpose(record["path"]), linewidth=0.8)
     for place in record["places"]:
-        axes.add_patch(Circle(place, NEAR, color="0.8", zorder=0))
+        axes.add_patch(Circle(place, GIVEN["near"], color="0.8", zorder=0))
     for place in record["pillars"]:
-        axes.add_patch(Circle(place, PILLAR, color="C1"))
+        axes.add_patch(Circle(place, GIVEN["pillar"], color="C1"))
 
 
 def goals_figure(groups: Mapping[str, Sequence[Record]]) -> Figure:
@@ -165,7 +165,7 @@ def write_page(folder: Path, episodes: Sequence[Any]) -> None:
     save_figure(courses_figure(groups["courses"]), folder, "courses", kinds=["svg"])
     text = rendered(
         "planning.md",
-        given=EPISODES,
+        given=GIVEN,
         episodes=episodes,
         groups=groups,
         goals=goals,

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 from matplotlib.figure import Figure
 from page import rendered
-from script import read_settings, run_script
+from script import read_settings, script
 
 import tetra_drake as td
 from tetra_drake.errors import InputError
@@ -149,6 +149,7 @@ def figure(motions_of: dict[str, dict[str, Motion]]) -> Figure:
     return page
 
 
+@script
 def main(arguments: Sequence[str]) -> None:
     if len(arguments) != 1:
         raise InputError("MODEL.xml", "", f"found {len(arguments)} files, expected one")
@@ -165,7 +166,3 @@ def main(arguments: Sequence[str]) -> None:
     numbers = {start: compared(by_name) for start, by_name in motions_of.items()}
     write_whole(OUT / "numbers.json", json.dumps(numbers, indent=1))
     write_whole(OUT / "README.md", rendered("published.md", starts=numbers))
-
-
-if __name__ == "__main__":
-    run_script(main)

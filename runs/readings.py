@@ -10,14 +10,13 @@ finished readings are skipped. `python runs/thesis_page.py` shows the numbers.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import pandas
-from script import chosen, evolved, read_record, read_settings, run_script
+from script import chosen, evolved, read_record, read_settings, script
 
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import check_file, read_json, write_whole
@@ -35,40 +34,23 @@ Record: TypeAlias = dict[str, list[dict[str, float]]]
 """Numbers of the trials by reading."""
 
 
-@dataclass(frozen=True)
-class Reading:
-    """A reading of the thesis's text: its changes of a shipped scenario."""
-
-    about: str
-    changes: Mapping[str, Any] = field(default_factory=dict)
-    base: str = "thesis"
-    run: str = ""
-    """Name of the recorded run of this reading, if there is one."""
-    trials_of: str = ""
-    """Name of another reading, whose trials end earlier in this one."""
-    stop: Mapping[str, Any] = field(default_factory=dict)
-    """Settings of SteadyState that end them."""
-
-
-_READ, _PROPOSED, THESIS = read_settings(HERE / "readings.yaml").values()
-READINGS, FUTURE = (
-    {k: Reading(**given) for k, given in each.items()} for each in (_READ, _PROPOSED)
-)
-"""Readings, and variations that the thesis proposes, by name. THESIS has its results."""
+READINGS, FUTURE, THESIS = read_settings(HERE / "readings.yaml").values()
+"""Readings, and variations that the thesis proposes, by name; and the thesis's results."""
 ALL = READINGS | FUTURE
-COARSE, FIXED = (READINGS[f"slip-{name}"].changes["engine"] for name in ("coarse", "fixed"))
+COARSE, FIXED = (READINGS[f"slip-{name}"]["changes"]["engine"] for name in ("coarse", "fixed"))
 """Engines of two readings."""
 
 
 def run_of(name: str) -> Run:
     """The run of a reading, evolved as far as it is not yet."""
-    reading = ALL[name]
-    if reading.trials_of:
-        return run_of(reading.trials_of)
-    if reading.run:
-        return load_run(HERE / reading.run)
-    base, changes = load_scenario(reading.base).on_engine("compiled"), dict(reading.changes)
-    return evolved(base.with_changes({"name": f"reading-{name}"} | changes), SCRATCH / name)
+    reading = {"base": "thesis", "changes": {}} | ALL[name]
+    if "trials_of" in reading:
+        return run_of(reading["trials_of"])
+    if "run" in reading:
+        return load_run(HERE / reading["run"])
+    base = load_scenario(reading["base"]).on_engine("compiled")
+    changes = {"name": f"reading-{name}"} | reading["changes"]
+    return evolved(base.with_changes(changes), SCRATCH / name)
 
 
 def last_iteration(means: Sequence[float], settings: SteadyState) -> int:
@@ -104,7 +86,7 @@ def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
 def numbers(name: str) -> list[dict[str, float]]:
     """Numbers of the trials of a reading."""
     run = run_of(name)
-    settings = SteadyState(**dict(run.scenario.optimizer) | dict(ALL[name].stop))
+    settings = SteadyState(**dict(run.scenario.optimizer) | ALL[name].get("stop", {}))
     trials = range(run.scenario.evolution.trials)
     rows = [numbers_of(run, trial, settings) for trial in trials]
     return [{key: float(f"{value:.5g}") for key, value in row.items()} for row in rows]
@@ -160,6 +142,7 @@ def off_by(trials: pandas.DataFrame) -> str:
     return ranged(float(factor(trials)), *factor_interval(trials))
 
 
+@script
 def main(names: Sequence[str]) -> None:
     """Records the readings of these names, or all. Raises InputError."""
     names = chosen(names, ALL)
@@ -172,7 +155,3 @@ def main(names: Sequence[str]) -> None:
             write_whole(RECORD, text + "\n")
     for name, trials in load_tables().items():
         print(f"{name}: off by a factor of {off_by(trials)}")
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from analyse import ANALYSIS, analyse
-from script import chosen, read_settings, run_script
+from script import chosen, read_settings, script
 from thinning import thin
 
 from tetra_drake.engines.simulate import simulate
@@ -205,13 +205,10 @@ def take_pictures(page: Path, *pictures: Path) -> None:
     subprocess.run([sys.executable, script, page, *pictures], check=True)
 
 
+@script
 def main(arguments: Sequence[str]) -> None:
     """Records the experiments of the given names, or all. Raises InputError."""
     names = [argument for argument in arguments if argument != SO_FAR]
     make = record_so_far if SO_FAR in arguments else record
     for name in chosen(names, EXPERIMENTS):
         make(name, EXPERIMENTS[name], scratch=SCRATCH, out=HERE)
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from page import rendered
-from script import evolved, run_script
+from script import evolved, script
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import load_run
@@ -37,6 +37,7 @@ def network_table() -> str:
     return rendered("rolling.md", best=evolved(scenario, SCRATCH).best())
 
 
+@script
 def main(_: Sequence[str] = ()) -> None:
     """Draws the picture, and prints the table of open loops."""
     run = load_run(HERE)
@@ -44,7 +45,3 @@ def main(_: Sequence[str] = ()) -> None:
     figure = one_step(result, time=(2.0, 7.0), instants=4, title=False)
     save_figure(figure, HERE, LAPSE, kinds=["svg"])
     print(network_table())
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -23,12 +23,16 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import parse_yaml
 
 T = TypeVar("T")
+Main = TypeVar("Main", bound=Callable[..., None])
 
 
-def run_script(main: Callable[[Sequence[str]], None]) -> None:
-    """Runs a script with its arguments, or shows its docstring for --help. An InputError and an
-    interrupt end it with one line."""
+def script(main: Main) -> Main:
+    """Decorator of a script's main function, the last one of its file. Where the file is the script
+    that was started, it runs with the arguments, or shows the docstring for --help. An InputError
+    and an interrupt end it with one line."""
     name, arguments = Path(sys.argv[0]).name, sys.argv[1:]
+    if main.__module__ != "__main__":
+        return main
     if {"-h", "--help"} & {*arguments}:
         sys.exit(sys.modules["__main__"].__doc__)
     try:
@@ -38,6 +42,7 @@ def run_script(main: Callable[[Sequence[str]], None]) -> None:
         sys.exit(f"{name}: {error}")
     except KeyboardInterrupt:
         sys.exit(f"{name}: interrupted; the same command goes on")
+    return main
 
 
 def chosen(names: Sequence[str], known: Iterable[str], what: str = "NAME") -> list[str]:

@@ -4,7 +4,7 @@
 
 A sine has two numbers: its frequency, and its lag from each junction to the next. Its amplitude is
 the peak of the signals of the run's best gait. The script writes the farthest of TRIED sines of
-each recorded run, by default of RUNS, to thesis/sine.json.
+each recorded run, by default of the runs in thesis/sine.json, to this file.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from script import measured, run_script
+from script import measured, script
 
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.evolution.run import Run, load_run
@@ -30,10 +30,6 @@ from tetra_drake.scenario.scenario import Scenario
 
 HERE = Path(__file__).parent
 RECORD = HERE / "thesis" / "sine.json"
-RUNS = [
-    *("thesis", "thesis-listing", "thesis-reversal", "cma-es"),
-    *("coulomb", "champion", "rough", "steps", "incline"),
-]
 FREQUENCIES, LAGS = np.arange(0.3, 2.6, 0.2), np.arange(15.0, 151.0, 15.0)
 """Frequencies in Hz; lags in degrees, with which the wave runs from the rear to the front."""
 TRIED = FREQUENCIES.size * LAGS.size
@@ -97,14 +93,11 @@ def farthest(run: Run) -> dict[str, float]:
     }
 
 
+@script
 def main(names: Sequence[str]) -> None:
     """Writes the record and prints it."""
     found = load_sines()
-    for name in names or RUNS:
+    for name in names or [*found]:
         found[name] = farthest(load_run(HERE / name))
         write_whole(RECORD, json.dumps(found, indent=1) + "\n")
         print(name, found[name], flush=True)
-
-
-if __name__ == "__main__":
-    run_script(main)

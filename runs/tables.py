@@ -25,7 +25,7 @@ from parting import partings
 from PIL import Image
 from readings import load_tables
 from record import EXPERIMENTS, PICTURE
-from script import run_script
+from script import script
 from settle import settled
 from sine import TRIED, load_sines
 
@@ -177,8 +177,8 @@ def differences(runs: Runs) -> pandas.DataFrame:
 
 
 def trust_table(runs: Runs) -> str:
-    """Table of the differences between engines and their causes, by law of friction."""
-    return rendered("trust.md", laws=differences(runs).groupby("coulomb"))
+    """Table of the differences between engines by law of friction, and their causes."""
+    return rendered("trust.md", gaits=differences(runs))
 
 
 def results_table(runs: Runs) -> str:
@@ -244,12 +244,9 @@ def filled(text: str, make_table: Callable[[str], str]) -> str:
     return text
 
 
+@script
 def main(arguments: Sequence[str]) -> None:
     """Runs the script: writes the tables of the given Markdown files, or of all pages."""
     runs = load_all()
     for page in [Path(name).resolve() for name in arguments] or pages(runs):
         write_whole(page, made_again(page, runs))
-
-
-if __name__ == "__main__":
-    run_script(main)

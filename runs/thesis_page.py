@@ -22,7 +22,7 @@ from analyse import load_analysis
 from claims import MOTION, claims
 from page import over, rendered
 from record import load_times
-from script import read_record, run_script
+from script import read_record, script
 from settle import difference_of_means, numbers
 from sine import TRIED, load_sines
 from tables import aspect, best_gait
@@ -122,7 +122,6 @@ def trials_numbers(run: Run) -> dict[str, Any]:
         "trial_seconds": seconds * iterations,
         "hertz": hertz,
         "swing": fixed(np.ptp(signals[trial]) / POUND_FORCE),
-        "twist": f"{best[['twist', 'lateral_drift']].to_numpy().max() / INCH:.0e}",
         **weights_pattern(run),
     }
 
@@ -234,13 +233,10 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
     )
 
 
+@script
 def main(_: Sequence[str] = ()) -> None:
     """Writes the page and the figures."""
     run = load_run(HERE / "thesis")
     save_figures(run, FIGURES)
     write_whole(NUMBERS, json.dumps(simulated_numbers(load_run(FORMER)), indent=1) + "\n")
     write_whole(PAGE, page(run, read_json(NUMBERS, "numbers")))
-
-
-if __name__ == "__main__":
-    run_script(main)

@@ -1,25 +1,10 @@
 """Interrupts that Python drops."""
 
-import os
 import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 from tetra_drake.interrupts import heeding_interrupts
-
-PROGRAM = Path(__file__).parent / "helpers" / "terminated_compiler.py"
-
-
-@pytest.mark.slow
-def test_a_sigterm_during_compilation_ends_a_command(tmp_path):
-    command, given = [sys.executable, PROGRAM, tmp_path / "out"], {"timeout": 40, "text": True}
-    given["env"] = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    ended = subprocess.run(command, capture_output=True, **given)
-    assert (ended.returncode, ended.stdout) == (130, "compiled\n")
-    assert ended.stderr == "\ntetra-drake: interrupted\n"
 
 
 class Loud:

@@ -8,7 +8,6 @@ import re
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -27,19 +26,10 @@ ORDER = [name for row in ROWS for name in row]
 """A folder, or a module beside the folders, imports only those before it."""
 
 
-def statements(tree: ast.Module) -> Iterator[ast.AST]:
-    """All statements of a module, inner ones, too."""
-    pending: list[ast.AST] = [tree]
-    for node in pending:
-        for field in ("body", "orelse", "handlers", "finalbody", "cases"):
-            pending += getattr(node, field, [])
-        yield node
-
-
 def imports(file: Path) -> set[str]:
     """The modules that a file imports anywhere, as dotted names."""
     modules = set()
-    for node in statements(trees()[file]):
+    for node in ast.walk(trees()[file]):
         if isinstance(node, ast.Import):
             modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:

@@ -5,6 +5,7 @@ import re
 import pytest
 from block_diagram import graphviz_source
 
+from tetra_drake.report.run_page import BLOCK_DIAGRAM
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -22,7 +23,9 @@ def label(source, block):
 
 def test_blocks_ports_in_use_and_their_connections_are_shown(robot):
     source = graphviz_source(robot)
+    drawn = set(re.findall(">([^<>]+)<", BLOCK_DIAGRAM.read_text(encoding="utf-8")))
     for system in robot.GetSystems():
+        assert {type(system).__name__, system.get_name()} <= drawn, "the picture of the report"
         assert f"{type(system).__name__}\\n{system.get_name()}" in label(source, system.get_name())
     in_use = re.findall(r"<[uy]\d+> (\w+)", label(source, "plant"))
     assert in_use == ["applied_generalized_force", "state"]  # of some thirty

@@ -1,11 +1,8 @@
 """A tetrahedron alone on the ground: settling_node.py and sliding_tetrahedron.py."""
 
-import math
-
 import numpy as np
 import pytest
-from one_tetrahedron import BASE, LEADING, TRAILING, weight
-from settling_node import IMPACT_SPEED, contact_speeds, settle
+from one_tetrahedron import BASE, LEADING, TRAILING
 from sliding_tetrahedron import flights, slide, slips, travel
 
 from tetra_drake.scenario.load import load_scenario
@@ -17,17 +14,6 @@ STICKS = [1.0, 0.0, 0.0]
 @pytest.fixture(scope="module")
 def sliding():
     return slide(load_scenario("thesis-reversal"))
-
-
-def test_it_meets_the_ground_as_asked_for_and_rests_on_its_weight(scenario):
-    settling = settle(scenario)
-    impact, rebound = contact_speeds(settling)
-    assert impact == pytest.approx(IMPACT_SPEED, rel=1e-2)
-    assert math.isnan(rebound)
-    assert settling.normal_forces[-1].sum() == pytest.approx(weight(scenario), rel=1e-2)
-    depth = weight(scenario) / (len(BASE) * scenario.ground.stiffness)
-    np.testing.assert_allclose(settling.p_WN[-1, list(BASE), 2], -depth, rtol=1e-2)
-    assert np.abs(settling.v_WN[-1]).max() < 1e-3 * IMPACT_SPEED
 
 
 def test_it_breaks_free_at_the_stiction_range_and_sticks_again(scenario, sliding):

@@ -1,7 +1,5 @@
 """Controllers: functions of time and readings in place of a gait, and systems on the diagram."""
 
-import functools
-
 import numpy as np
 import pytest
 from helpers.controllers import Springs, follow_waves
@@ -14,7 +12,6 @@ from tetra_drake.errors import InputError
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Controller, controlled_robot
 from tetra_drake.robot.readings import Readings
-from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -30,11 +27,6 @@ def walking() -> Scenario:
     settings = {"friction.stiffness": "0 N/m", "simulation.sample_period": "30 ms"}
     settings["robot.tetrahedra"] = 3
     return shortly(load_scenario("coulomb"), 0.6, **settings)
-
-
-@pytest.fixture
-def controller(walking):
-    return functools.partial(follow_waves, controlled_robot(walking))
 
 
 @pytest.mark.parametrize("kind", [RuntimeError, InputError, KeyboardInterrupt])
@@ -68,13 +60,13 @@ def moved_as_simulate_does(
     return result
 
 
-def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
+def test_the_controller_of_a_diagram_is_that_of_simulate(walking):
     """The function is called at the same times, and its forces are held."""
     robot, times = controlled_robot(walking), list[float]()
 
     def law(time: float, readings: Readings) -> np.ndarray:
         times.append(time)
-        return controller(time, readings)
+        return follow_waves(robot, time, readings)
 
     system = SampledController(robot, law, period=0.02)
     diagram = MakeTensegrityDiagram(robot, controller=system)
@@ -100,10 +92,3 @@ def test_a_controller_may_have_further_ports_and_makes_no_algebraic_loop(walking
     diagram.GetInputPort("wanted").FixValue(context, -0.25 * structure.initial_lengths)
     found = diagram.GetOutputPort("signals").Eval(context)
     np.testing.assert_allclose(found, 0.75 * robot.starting_cables().length, rtol=1e-12)
-
-
-def test_a_robot_without_signals_needs_none():
-    robot = Robot.of(load_scenario("prism").with_changes({"robot.actuated": {}}))
-    diagram = MakeTensegrityDiagram(robot)
-    assert diagram.num_input_ports() == 0
-    assert diagram.GetOutputPort("signals").size() == 0

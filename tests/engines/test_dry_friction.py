@@ -9,11 +9,10 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.mjcf import loose_remark, make_mjcf
-from tetra_drake.kernels.lanes import exponential
 from tetra_drake.laws.actuator import Winch
-from tetra_drake.laws.cable import LENGTH, TENSION, CableLaw, elastic_energy
+from tetra_drake.laws.cable import LENGTH, TENSION, elastic_energy
 from tetra_drake.laws.contact import MODE_COLUMNS
-from tetra_drake.laws.dry_friction import CREEP, turn_between
+from tetra_drake.laws.dry_friction import CREEP
 from tetra_drake.laws.forces import forces_of_motion
 from tetra_drake.laws.kinematics import FORCE
 from tetra_drake.robot.robot import Robot
@@ -75,7 +74,7 @@ def test_a_bead_with_friction_moves_as_an_independent_simulation_and_only_loses_
     x, z, *_ = solve_ivp(bead, (0.0, 0.3), start, **exact).y
     p = found.p_WN.sel(node="p", axis=["x", "z"]).values.T
     np.testing.assert_allclose(p, [x, 1.0 + z], atol=5e-5)  # found: 2e-6, by !Drake 2.4e-5
-    law = CableLaw(**robot.structure.cable_laws[0])
+    law = robot.structure.cable_laws[0]
     stretch = found.length.values[:, 0] - law.free_length
     square = (found.v_WN.sel(node="p") ** 2).sum("axis").values
     energy = 0.5 * LIGHT * square + elastic_energy(np.maximum(stretch, 0.0), law)
@@ -113,14 +112,6 @@ def test_each_swing_of_a_pendulum_loses_the_work_of_dry_friction(engine):
     weight = structure.mass[1] * G * structure.p_BN[structure.node_names.index("c"), 2]
     lost = -weight * np.diff(np.cos(swings))
     np.testing.assert_allclose(-lost, 2.0 * torque * (swings[1:] + swings[:-1]), rtol=0.015)
-
-
-@pytest.mark.parametrize("mu", [0.0, 0.3, 1.0])
-def test_numbers_of_the_law(mu):
-    for angle in (0.0, 1e-3, 0.7, np.pi / 2, 3.0, np.pi):
-        a, b = (1.0, 0.0, 0.0), (np.cos(angle), np.sin(angle), 0.0)
-        assert turn_between(a, b) == pytest.approx(angle, rel=1e-13, abs=1e-16)
-        assert exponential(mu * angle) == pytest.approx(np.exp(mu * angle), rel=1e-13)
 
 
 def test_mujoco_refuses_friction_at_rings_and_files_for_it_say_that_it_is_left_out(refused):

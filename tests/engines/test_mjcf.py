@@ -21,7 +21,6 @@ from tetra_drake.lab.study.equilibrium import (
     robot_of_structure,
     study_equilibrium,
 )
-from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -92,7 +91,7 @@ def test_drake_has_the_bodies_of_the_sdf_and_its_cables_the_tensions_at_rest(stu
     p_WN = [node.CalcPoseInWorld(context).translation() for node in nodes]
     np.testing.assert_allclose(p_WN, node_positions(structure, state), atol=1e-9)
     ends = zip(structure.cable_names, structure.cable_ends, structure.cable_laws, strict=True)
-    cables = [Cable(name, nodes[a], nodes[b], CableLaw(**law)) for name, (a, b), law in ends]
+    cables = [Cable(name, nodes[a], nodes[b], law) for name, (a, b), law in ends]
     network = AddCables(builder, plant, cables=cables, slack=structure.slack)
     diagram = builder.Build()
     here = network.GetMyContextFromRoot(diagram.CreateDefaultContext())

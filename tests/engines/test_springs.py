@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.study.equilibrium import study_equilibrium
-from tetra_drake.laws.cable import CableLaw, elastic_energy, elastic_stretch, elastic_tension
+from tetra_drake.laws.cable import elastic_energy, elastic_stretch
 from tetra_drake.report.summary import result_text
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -57,7 +57,7 @@ def test_masses_fall_into_springs_and_are_thrown_back(engine):
         expected = solve_ivp(motion, (0.0, 0.3), start, **exact).y[0]
         np.testing.assert_allclose(length, expected, atol=5e-5)  # found: 2.6e-5, by MuJoCo
         np.testing.assert_allclose(tension, [pull(name, x - FREE) for x in length], atol=1e-9)
-        law = CableLaw(**Robot.of(scenario).structure.cable_laws[number])
+        law = Robot.of(scenario).structure.cable_laws[number]
         stretch = np.maximum(length - FREE, 0.0)
         speed = found.v_WN.sel(node=f"m-{name}", axis="z").values
         energy = 0.5 * MASS * speed**2 - MASS * G * length + elastic_energy(stretch, law)
@@ -73,30 +73,20 @@ def test_masses_at_rest_stretch_springs_as_their_data_sheets_say():
     study = study_equilibrium(Robot.of(heavy, at_rest=True))
     stretch = study.cables["length"].to_numpy() - FREE
     assert stretch[0] == pytest.approx((MASS * G - 3.0) / 200.0, rel=1e-6)
-    for name, x in zip(SPRINGS, stretch, strict=True):
+    for name, x, law in zip(SPRINGS, stretch, structure.cable_laws, strict=True):
         assert pull(name, x) == pytest.approx(MASS * G, abs=2e-5)  # x is rounded to 1 nm
+        assert elastic_stretch(MASS * G, law) == pytest.approx(x, abs=1e-9)
     slopes = [200.0, 100.0 + 4e3 * stretch[1] + 12e5 * stretch[1] ** 2, 300.0, 2e4]
     bounces, swings = np.sqrt(np.divide(slopes, MASS)), np.sqrt(G / (FREE + stretch))
     expected = np.sort([*bounces, *swings, *swings]) / (2.0 * np.pi)
     np.testing.assert_allclose(study.frequencies, expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize("name", SPRINGS)
-def test_energy_and_stretch_of_a_spring_fit_its_tension(name):
-    law = CableLaw(**Robot.of(hung("!Compiled")).structure.cable_laws[[*SPRINGS].index(name)])
-    x = np.linspace(0.0, 0.05, 5001)[1:]
-    tension = np.array([pull(name, each) for each in x])
-    np.testing.assert_allclose(elastic_tension(x, law), tension, rtol=1e-12)
-    np.testing.assert_allclose(elastic_stretch(tension, law), x, rtol=1e-9)
-    work = np.cumsum(0.5 * (tension + np.append(0.0, tension[:-1]))) * 1e-5
-    np.testing.assert_allclose(elastic_energy(x, law), work, rtol=1e-4, atol=2e-5)
-
-
 def test_a_string_without_stiffness_gets_that_of_anchors():
     tree = StructureFile.model_validate(TREES["strung"])
     law = tree.blueprint().cable_laws[0]
-    assert law["stiffness"] == pytest.approx(2.0 * G / (1e-5 * 0.4))  # sags by 1e-5 of its length
-    assert law["damping"] == 1e-3 * law["stiffness"]
+    assert law.stiffness == pytest.approx(2.0 * G / (1e-5 * 0.4))  # sags by 1e-5 of its length
+    assert law.damping == 1e-3 * law.stiffness
 
 
 LINE = {"string": True, "stiffness": 2e4, "damping": 20.0}

@@ -12,7 +12,6 @@ from tetra_drake.robot.command import Command
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import moved_nodes
-from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -113,18 +112,6 @@ def test_the_diagrams_default_context_and_its_simulator_have_the_velocities_of_t
     for context in (diagram.CreateDefaultContext(), simulator.get_context()):
         found = context.get_continuous_state().get_generalized_velocity().CopyToVector()
         np.testing.assert_array_equal(found, [0.0, 0.0, 0.0, 3.0, 0.0, 4.0] * 2)
-
-
-def test_draws_vary_velocities_and_pushes():
-    spreads = {"robot.start.velocity[2]": 0.5, "events[0].push.impulse[2]": 0.5}
-    push = PUSH | {"push": PUSH["push"] | {"on": "n3"}}
-    changes = {"robot.start": {"velocity": ["0 m/s", "0 m/s", "2 m/s"]}, "events": [push]}
-    changes["disturbances"] = {"draws": 1, "spreads": spreads}
-    scenario = load_scenario("prism").with_changes(changes)
-    drawn = disturbed(scenario, draw_disturbances(scenario, (1, 2)))
-    ratios = drawn.robot.start.velocity[2] / 2.0, drawn.events[0].push.impulse[2] / 0.02
-    assert all(0.5 <= ratio <= 1.5 and ratio != 1.0 for ratio in ratios)
-    assert ratios[0] != ratios[1]
 
 
 @pytest.mark.parametrize("name", ["held_rod", "joined_rod"])

@@ -68,15 +68,9 @@ FAILING = [
 ]
 
 
-@pytest.mark.parametrize("lanes", [False, True], ids=["diagram", "lanes"])
 @pytest.mark.parametrize(("changes", "objective", "kind"), FAILING)
-def test_failures_say_why_and_are_the_worst(tiny, vectors, lanes, changes, objective, kind):
-    engine = {"engine": "!Compiled" if lanes else "!Drake"}
-    evaluate = GaitEvaluation(tiny.with_changes(engine | changes), objective)
-    failed = evaluate(Task(vectors[0]))
-    if lanes:
-        with in_lanes(evaluate, 1) as submit:
-            failed = submit(Task(vectors[0])).result()
+def test_failures_say_why_and_are_the_worst(tiny, vectors, changes, objective, kind):
+    failed = GaitEvaluation(tiny.with_changes(changes), objective)(Task(vectors[0]))
     assert failed.failure.startswith(kind)
     assert (failed.fitness, failed.metrics) == (-math.inf, {})
     assert failed.wall_time > 0.0

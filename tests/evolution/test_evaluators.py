@@ -6,14 +6,11 @@ import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 import yaml
 from helpers import analytic
-from helpers.converged import shortly
 
-import tetra_drake
 from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
 from tetra_drake.evolution.run import load_run
 
@@ -42,8 +39,6 @@ def test_a_function_that_workers_cannot_load_is_told(tasks, monkeypatch, capfd, 
 
 
 PROGRAM = yaml.safe_load(Path(__file__).with_name("program.yaml").read_text("utf-8"))
-PROGRAM_FROM_STDIN = ModuleType("__main__")
-PROGRAM_FROM_STDIN.__file__ = "<stdin>"
 
 
 def run_program(folder, call, *, how):
@@ -64,36 +59,13 @@ def test_a_program_without_guard_is_told(tmp_path):
     assert "InputError" in error and "__main__" in error
 
 
-PROGRAMS = [
-    (ModuleType("__main__"), "what is defined interactively"),
-    (PROGRAM_FROM_STDIN, "'<stdin>' is no file"),
-    (None, "define it in a module"),
-]
+OWN = "evolve(objective=objective)"
+LOCAL = 'if __name__ == "__main__":\n    evolve(objective=lambda result: 1.0)'
+SENT = [("stdin", "evolve()", True), ("file", LOCAL, True), ("argument", "evolve()", False)]
+SLOW = [pytest.param(*each, marks=pytest.mark.slow) for each in SENT]
 
 
-@pytest.mark.parametrize(("program", "problem"), PROGRAMS)
-def test_gaits_are_evaluated_here_if_others_cannot_import_it(
-    program, problem, tmp_path, monkeypatch
-):
-    def objective(result):
-        return result.metrics.twist
-
-    if program:
-        monkeypatch.setitem(sys.modules, "__main__", program)
-        monkeypatch.setattr(program, "objective", objective, raising=False)
-        objective.__module__, objective.__qualname__ = "__main__", "objective"
-    scenario = shortly(analytic.small_scenario(population=4, iterations=1, trials=1), 0.02)
-    quick = {"reevaluate": False, "report": False}
-    with pytest.warns(RuntimeWarning, match=f"one by one in this process.* {problem}"):
-        run = tetra_drake.evolve(scenario, tmp_path / "run", objective=objective, **quick)
-    assert len(run.evaluations) == 6 and run.evaluations["fitness"].notna().all()
-
-
-OF_NO_FILE = [("argument", "evolve(objective=objective)", True), ("stdin", "evolve()", True)]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("how", "call", "alone"), [*OF_NO_FILE, ("argument", "evolve()", False)])
+@pytest.mark.parametrize(("how", "call", "alone"), [("argument", OWN, True), *SLOW])
 def test_evolution_works_where_processes_cannot_import_the_program(how, call, alone, tmp_path):
     ended = run_program(tmp_path, call, how=how)
     assert ended.stdout == "6 0\n", ended.stderr

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -11,18 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from helpers.analytic import DrawnBowl, drawn_scenario, read_record, record_run
 
-import tetra_drake as td
 from tetra_drake.evolution.manifest import MANIFEST
 
 PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
-
-
-KILLS_OF_COMMANDS = int(os.environ.get("KILLS", "3"))
-GIVEN = yaml.safe_load(Path(__file__).with_name("killed.yaml").read_text("utf-8"))
-"""A scenario, and a program that evolves it."""
 
 
 def run_and_kill(directory, executor, *, after=None, sign=signal.SIGKILL, delay=0.0):
@@ -72,65 +64,3 @@ def test_killed_runs_resume_and_end_alike(tmp_path, uninterrupted, executor, sig
     scenario = None if (tmp_path / MANIFEST).exists() else drawn_scenario(iterations=100)
     record_run(tmp_path, scenario, seed=9, evaluate=DrawnBowl())
     assert read_record(tmp_path) == uninterrupted
-
-
-def records_of(folder):
-    """Scenario, manifest and evaluations of a run, without wall times."""
-    run = td.load_run(folder)
-    table = run.evaluations.drop(columns=[c for c in run.evaluations if "wall" in c])
-    return run.manifest.seed, table.to_csv()
-
-
-def worker_of(process):
-    """A process that a process of ours has started, or its own number while it has none."""
-    for name in Path(f"/proc/{process.pid}/task").iterdir():
-        for child in map(int, (name / "children").read_text().split()):
-            if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
-                return child
-    return process.pid
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["overwrite", "worker", "video"])
-def test_a_killed_command_can_be_given_again(kind, tmp_path):
-    engine = "!Drake {accuracy: 1e-2}" if kind == "worker" else "!Compiled"
-    (tmp_path / "a.yaml").write_text(GIVEN["scenario"].replace("ENGINE", engine))
-    (tmp_path / "evolve.py").write_text(GIVEN["program"])
-    paths = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    given = {"cwd": tmp_path, "env": paths, "start_new_session": True, "stderr": subprocess.PIPE}
-    again = [sys.executable, "evolve.py", "2", "run"]
-    if kind == "video":
-        again = [sys.executable, "-m", "tetra_drake", "video", "old", "--out", "walk.gif"]
-        again += ["--size", "160x120"]
-    subprocess.run([sys.executable, "evolve.py", "1", "old"], **given, check=True)
-    shutil.copytree(tmp_path / "old", tmp_path / "run")
-    began = time.monotonic()
-    subprocess.run(again, **given, check=True)
-    longest, rng = time.monotonic() - began, np.random.default_rng()
-    whole = records_of(tmp_path / "run")
-    old = records_of(tmp_path / "old")
-    assert kind == "video" or old[0] != whole[0]
-    film = tmp_path / "walk.gif"
-    size = film.stat().st_size if kind == "video" else 0
-    for number in range(KILLS_OF_COMMANDS):
-        film.unlink(missing_ok=True)
-        if kind != "video":
-            shutil.rmtree(tmp_path / "run")
-            shutil.copytree(tmp_path / "old", tmp_path / "run")
-        with subprocess.Popen(again, **given) as process:
-            time.sleep(rng.uniform(0.2, 1.0) * longest)
-            if kind == "worker":
-                with contextlib.suppress(OSError):
-                    os.kill(worker_of(process), signal.SIGKILL)
-            else:
-                sign = [signal.SIGKILL, signal.SIGTERM][number % 2]
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(process.pid, sign)
-            _, messages = process.communicate(timeout=60)
-        assert process.returncode != 1 or b"InputError: worker" in messages
-        assert not film.exists() or film.stat().st_size == size
-        subprocess.run(again, **given, check=True)
-        assert records_of(tmp_path / "run") == whole
-        left = {path.name for path in tmp_path.iterdir()} - {"a.yaml", "evolve.py", "old", "run"}
-        assert left <= {"walk.gif"}
-        assert [path.name for path in (tmp_path / "run").glob(".*")] == [".lock"]

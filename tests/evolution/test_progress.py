@@ -19,38 +19,16 @@ def test_a_line_is_about_all_trials_and_shows_the_fittest_gait():
         assert part in stream.getvalue()
 
 
-def test_plain_lines_come_now_and_then_and_at_the_end_with_one_time_left(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr("tetra_drake.evolution.progress.time.monotonic", lambda: now[0])
-    stream = io.StringIO()
-    status = replace(STATUS)
-    with Progress(stream) as progress:
-        for second in range(25):
-            now[0] = 100.0 + second
-            progress.show([status])
-            status.evaluations += 1
-        status.evaluations, status.stop = 70, "levelled off"
-        for _ in range(3):
-            progress.show([status])
-        for done in range(4):
-            progress.stage("best gaits", done, 3)
-    lines = stream.getvalue().splitlines()
-    counts = ["40 of 140", "50 of 140", "60 of 140", "70 of 70"]
-    assert [line.partition(": ")[2].partition(",")[0] for line in lines[:4]] == counts
-    # One evaluation per second, not counting the 40 that were there at the beginning.
-    assert [line.endswith("0:01:20 left") for line in lines[:4]] == [False, False, True, False]
-    assert lines[4:] == ["best gaits: 0 of 3", "best gaits: 3 of 3"]
-
-
-def test_the_time_left_counts_no_compilation_and_waits_until_it_is_known(monkeypatch):
+def test_lines_come_now_and_then_and_their_time_left_counts_no_compilation(monkeypatch):
     now, compiled = [0.0], [0.0]
     monkeypatch.setattr("tetra_drake.evolution.progress.time.monotonic", lambda: now[0])
     monkeypatch.setattr("tetra_drake.evolution.progress.compiling_time", lambda: compiled[0])
     stream = io.StringIO()
-    moments = [(0, 0, 0), (38, 30, 8), (51, 30, 20), (101, 75, 20), (125, 75, 50)]
+    moments = [(0, 0, 0), (38, 30, 8), (51, 30, 20), (59, 30, 20), (101, 75, 20), (125, 75, 50)]
+    moments += [(126, 75, 100), (127, 75, 100)]
     with Progress(stream) as progress:
         for now[0], compiled[0], done in moments:
             progress.stage("gaits", done, 100)
     left = [line.partition("of 100")[2] for line in stream.getvalue().splitlines()]
-    # After the first 8 gaits: 12 in 13 s, then 42 in 42 s.
-    assert left == ["", "", ", 0:01:27 left", ", 0:00:50 left"]
+    # After the first 8 gaits: 12 in 13 s, then 42 in 42 s. The end is told at once, and once.
+    assert left == ["", "", ", 0:01:27 left", ", 0:00:50 left", ""]

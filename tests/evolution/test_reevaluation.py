@@ -1,11 +1,8 @@
 """Gaits of a run evaluated once more: which, how often, and what is kept of it."""
 
-from unittest.mock import Mock
-
 import pytest
 from helpers.analytic import Bowl, in_threads
 
-from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Evaluation
@@ -22,18 +19,16 @@ def test_the_five_best_of_each_trial_are_evaluated_again_once(run_small, monkeyp
 
     name = "tetra_drake.evolution.reevaluation.evaluator_of"
     monkeypatch.setattr(name, lambda *_, **__: in_threads(nearer))
-    directory, shown = run_small(), Mock(spec=Progress)
+    directory = run_small()
     best = load_run(directory).best(5).set_index(["trial", "index"])
-    chosen = reevaluate(directory, progress=shown).reevaluations.set_index(["trial", "index"])
+    chosen = reevaluate(directory).reevaluations.set_index(["trial", "index"])
     assert sorted(chosen.index) == sorted(best.index)
-    assert set(chosen["engine"]) == {"drake"} and shown.stage.called
+    assert set(chosen["engine"]) == {"drake"}
     assert (chosen["tau_A"] == best.loc[chosen.index, "tau_A"]).all()
     shorter = best.loc[chosen.index, "distance_in"] - 0.5 / 0.0254
     assert chosen["distance_in"].tolist() == pytest.approx(shorter.tolist())
     # What is recorded whole is not evaluated again.
-    not_shown = Mock(spec=Progress)
-    assert len(reevaluate(directory, progress=not_shown).reevaluations) == len(asked) == 10
-    not_shown.stage.assert_not_called()
+    assert len(reevaluate(directory).reevaluations) == len(asked) == 10
     path = directory / "trial_01" / "reevaluations.jsonl"
     path.write_bytes(path.read_bytes()[:-9])
     assert len(reevaluate(directory).reevaluations) == 10

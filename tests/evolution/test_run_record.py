@@ -1,8 +1,7 @@
 """Run directories: what is refused, repaired and reported, and how runs are resumed."""
 
 import json
-import os
-from unittest.mock import Mock
+import shutil
 
 import numpy as np
 import pytest
@@ -64,16 +63,6 @@ def test_runs_are_resumed_where_one_is_and_begun_where_none_is(run_small, tmp_pa
     with RunRecord.resume(run, scenario=small_scenario().with_changes({"name": "another"})):
         pass
     assert read_record(run) == before
-
-
-def test_a_pipe_in_place_of_a_file_is_refused_at_once(run_small, refused):
-    run = run_small(trials=1)
-    for name, read in (("trial_00/evaluations.jsonl", load_run), (".lock", RunRecord.resume)):
-        (run / name).rename(run / "aside")
-        os.mkfifo(run / name)
-        with refused(run / name, "", "pipe"):
-            read(run)
-        (run / "aside").replace(run / name)
 
 
 def test_what_a_kill_in_the_first_moment_leaves_is_an_empty_directory(tmp_path):
@@ -150,19 +139,25 @@ def test_a_line_too_many_or_there_twice_is_refused(run_small, refused):
         run_small(resume=True)
 
 
-def test_a_run_is_replaced_when_a_new_one_has_its_first_line(run_small, monkeypatch, refused):
+def test_a_run_is_replaced_when_a_new_one_has_its_first_line(
+    run_small, tmp_path, monkeypatch, refused
+):
     run = run_small()
     (run / "report.html").touch()
-    before = read_record(run)
+    before, killed = read_record(run), tmp_path / "killed"
 
-    fail = Mock(side_effect=InputError(run, "", "disk full"))
+    def fail(*_):
+        shutil.copytree(run, killed)  # as a kill would leave it
+        raise InputError(run, "", "disk full")
+
     with RunRecord.create(run, scenario=small_scenario(), seed=6, overwrite=True) as record:
         file = RepeatedFile(record, 0, "in_progress.jsonl")
         assert file.lines == []
         with monkeypatch.context() as broken, refused(run, "", "disk full"):
             broken.setattr("tetra_drake.evolution.manifest.write_manifest", fail)
             record.begin()
-        assert read_record(run) == before
+        with RunRecord.resume(killed):
+            assert read_record(killed) == read_record(run) == before
         file.write([EvaluationLine.of(Task(np.ones(26)), Evaluation(1.0))], first=0)
     files = {".lock", "manifest.json", "scenario.yaml", "trial_00/in_progress.jsonl"}
     assert read_record(run).keys() == files

@@ -78,23 +78,17 @@ def drawn_texts(monkeypatch):
 SLOW = pytest.mark.slow
 
 
-WIDE, NARROW, GIVEN = 7.0, 3.4, (5.0, 8.0)
-"""Widths of a page, and the size of a given figure (in)."""
+WIDE, NARROW = 7.0, 3.4
+"""Widths of a page (in)."""
 
 
-@pytest.fixture(
-    params=[NARROW, *(pytest.param(page, marks=SLOW) for page in (WIDE, GIVEN))], ids=repr
-)
+@pytest.fixture(params=[NARROW, pytest.param(WIDE, marks=SLOW)], ids=repr)
 def check(drawn_texts, request):
-    """check(draw, *data): checks a figure on a page of its own of some width, or on a given one."""
+    """check(draw, *data): checks a figure on a page of its own of some width."""
 
     def check(draw, *data):
-        if isinstance(request.param, float):
-            figure = draw(*data, width_in=request.param)
-            assert figure.get_figwidth() == request.param and figure.get_figheight() <= 10.0
-        else:
-            figure = Figure(figsize=request.param)
-            assert draw(*data, figure=figure) is None
+        figure = draw(*data, width_in=request.param)
+        assert figure.get_figwidth() == request.param and figure.get_figheight() <= 10.0
         texts = drawn_texts(figure)
         assert texts[:, :2].min() >= 0.0 and (texts[:, 2:] <= figure.bbox.size).all()
         for a, b in itertools.combinations(texts, 2):
@@ -104,7 +98,7 @@ def check(drawn_texts, request):
 
 
 QUICK = ("five", NARROW), ("long names", WIDE)
-ALL = itertools.product(("three", "five", "long names"), (WIDE, NARROW, GIVEN))
+ALL = itertools.product(("three", "five", "long names"), (WIDE, NARROW))
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,13 @@ Arm = tuple[DiagramBuilder, MultibodyPlant, Frame, list[Cable]]
 def rod_with_tendons(**constants: object) -> Arm:
     """A rod along x that turns about y, its free end, and two tendons to it from the world, by a
     law with other constants."""
+    arm = unfinished_rod(**constants)
+    arm[1].Finalize()
+    return arm
+
+
+def unfinished_rod(**constants: object) -> Arm:
+    """The same in a plant that is not finalized."""
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
     inertia = SpatialInertia.ThinRodWithMassAboutEnd(MASS, LENGTH, [1.0, 0.0, 0.0])
@@ -31,5 +38,4 @@ def rod_with_tendons(**constants: object) -> Arm:
     places, law = {"left": LEFT, "right": RIGHT}, LAW._replace(**constants)
     anchors = [AddFrame(plant, name, plant.world_frame(), place) for name, place in places.items()]
     cables = [Cable(anchor.name(), anchor, tip, law) for anchor in anchors]
-    plant.Finalize()
     return builder, plant, tip, cables

@@ -88,17 +88,3 @@ def recorded_structure(data: Path, name: str) -> dict[str, Any]:
     recorded = json.loads((data / "structures.json").read_text())["structures"]
     structure: dict[str, Any] = recorded[name.replace("_", "-")]
     return structure
-
-
-def onto_recorded(recorded: dict[str, Any], names: tuple[str, ...], p_WN: np.ndarray) -> np.ndarray:
-    """Turn about z, and shift, that bring nodes p_WN (nodes, 3) nearest to the nodes at rest of the
-    recorded structure: (3, 4)."""
-    theirs = np.array([recorded["nodes_at_rest"][name] for name in names])
-    centre, their_centre = p_WN.mean(axis=0), theirs.mean(axis=0)
-    x, y, _ = (p_WN - centre).T
-    their_x, their_y, _ = (theirs - their_centre).T
-    angle = np.arctan2((x * their_y - y * their_x).sum(), (x * their_x + y * their_y).sum())
-    s, c = np.sin(angle), np.cos(angle)
-    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    shift = (their_centre - R @ centre) * [1.0, 1.0, 0.0]
-    return np.column_stack([R, shift])

@@ -16,7 +16,6 @@ from tetra_drake.kernels.lanes import (
     any_lane,
     floor,
     gather,
-    inverse_sqrt,
     lane_table,
     maximum,
     minimum,
@@ -92,36 +91,6 @@ def test_functions_of_plain_numbers_are_as_documented():
     assert gather(np.arange(100.0) ** 2, 7.0, 1) == 64.0
 
 
-def test_inverse_square_root_is_within_two_units_in_the_last_place(width):
-    @jit
-    def invert_roots(x, results):
-        for n in range(x.size):
-            results[n] = inverse_sqrt(x[n])
-
-    # Seven numbers in a decade of its range, and all mantissas of even and odd exponents.
-    x = np.append(np.geomspace(1e-37, 1e38, 528), np.linspace(0.9, 4.1, 272)).clip(1e-37, 1e38)
-    results = in_lanes(np.zeros_like(x), width)
-    invert_roots(in_lanes(x, width), results)
-    exact = 1.0 / np.sqrt(x.astype(np.longdouble))
-    for found in (results.array.ravel(), [inverse_sqrt(number) for number in x.tolist()]):
-        assert (np.abs(found - exact) / np.spacing(exact.astype(float))).max() < 2.0
-
-
-@jit
-def swap(x):
-    x[0], x[1] = x[1], x[0]
-
-
-@pytest.mark.parametrize("first", [0, 3])
-def test_lanes_may_begin_at_any_double(width, first):
-    memory = lane_table((3,), 8).array.ravel()  # begins where a register does
-    numbers = memory[first : first + 2 * width].reshape(2, width)
-    numbers[:] = np.arange(2.0 * width).reshape(2, width)
-    swap(FieldArray(numbers, width))
-    assert np.array_equal(numbers, np.arange(2.0 * width).reshape(2, width)[::-1])
-    assert memory.sum() == numbers.sum(), "the doubles beside them stay zero"
-
-
 def branch_on_a_mask(line, plane):
     if line[0] > 0.0:
         line[0] = 0.0
@@ -138,12 +107,3 @@ REFUSED += [lambda line, plane: line[0] + plane[0, 0]]  # of other widths
 def test_numba_refuses(kernel):
     with pytest.raises(TypingError):
         jit(kernel)(lane_table((3,), 4), lane_table((3, 4), 8))
-
-
-MISREAD = [(np.zeros((3, 4), np.float32), 4), (np.zeros((3, 8))[:, ::2], 4), (np.zeros((3, 4)), 8)]
-
-
-@pytest.mark.parametrize(("array", "width"), MISREAD)
-def test_arrays_that_kernels_would_read_wrongly_are_refused(array, width):
-    with pytest.raises(ValueError):
-        FieldArray(array, width)

@@ -44,15 +44,6 @@ def test_the_folder_has_the_signals_of_the_gait_and_begins_where_the_robot_does(
     assert edge[0] == pytest.approx(6 * 25.4, abs=1e-5)
 
 
-def test_a_tension_motor_is_commanded_the_whole_law_of_the_cable(short, tmp_path):
-    driven = short.with_changes(MOTOR)
-    export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
-    samples = load_command(tmp_path / "lab" / COMMAND, driven).samples
-    # At the start the law is that of the spring, with which the motor begins.
-    np.testing.assert_allclose(samples[0], Robot.of(driven).starting_drives(), atol=1e-6)
-    assert samples.min() >= 0.0 and samples.max() <= 10.0
-
-
 @pytest.mark.parametrize("kind", ACTUATIONS.values(), ids=ACTUATIONS)
 def test_the_loads_are_those_of_the_metrics_and_of_what_is_wound(short, kind, tmp_path):
     often = {"simulation.sample_period": "1 ms"}

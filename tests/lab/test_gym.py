@@ -50,7 +50,7 @@ def episode(env: gymnasium.Env, *, seed: int) -> tuple[np.ndarray, list[float], 
 @pytest.mark.parametrize("name", [WALK, ROLL])
 def test_the_environments_pass_gymnasiums_checks(name):
     env = gymnasium.make(name).unwrapped
-    assert ("rolled" in env._episodes.simulation.scenario.objective) == (name == ROLL)
+    assert ("rolled" in env._one.simulation.scenario.objective) == (name == ROLL)
     check_env(env, skip_render_check=True)
 
 
@@ -59,16 +59,16 @@ def test_an_action_is_the_signal_as_a_share_of_the_networks(short, actuation):
     env = TensegrityEnv(short.with_changes(actuation), grouped=True)
     env.reset(seed=0)
     env.step(np.array([0.0, 1.0, -1.0, 0.0]))
-    simulation: Simulation = env._episodes.simulation
+    simulation: Simulation = env._one.simulation
     amplitude = 0.5 * short.cpg.gain * short.cpg.external_input
     shifts = np.array([0.0, 0.0, 1.0, 1.0, -1.0, -1.0, 0.0, 0.0])
     stiffness = simulation.robot.structure.cables["stiffness"][simulation.robot.driven]
     per_newton = -1.0 / stiffness if actuation is WINCH else np.ones(8)
-    setpoints = env._episodes._setpoints(np.array([[0.0, 1.0, -1.0, 0.0]]))[0]
-    rest = env._episodes._setpoints(np.zeros((1, 4)))[0]
+    setpoints = env._one._setpoints(np.array([[0.0, 1.0, -1.0, 0.0]]))[0]
+    rest = env._one._setpoints(np.zeros((1, 4)))[0]
     np.testing.assert_allclose(setpoints - rest, amplitude * shifts * per_newton, rtol=1e-9)
     if actuation is not MOTOR:  # which does not push
-        beyond = env._episodes._setpoints(np.array([[0.0, 2.0, -2.0, 0.0]]))[0]
+        beyond = env._one._setpoints(np.array([[0.0, 2.0, -2.0, 0.0]]))[0]
         np.testing.assert_allclose(beyond - rest, 2.0 * (setpoints - rest), rtol=1e-9)
 
 

@@ -17,7 +17,6 @@ from tetra_drake.errors import InputError
 from tetra_drake.lab.linearization.linearization import linearize
 from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.laws.contact import MODE_COLUMNS
-from tetra_drake.robot.readings import first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -216,9 +215,3 @@ def test_the_turn_of_a_spinning_body_from_another_is_carried_along():
     turning, turn = linearize(robot, state).system.A()[:3, :3], np.array([0.1, 0.2, 0.3])
     expected = Rotation.from_rotvec(2.0 * w).apply(turn)
     assert expm(2.0 * turning) @ turn == pytest.approx(expected, abs=1e-8)
-
-
-def test_a_robot_without_actuators_has_no_inputs():
-    linear = linearize(scenario_of(HUNG))
-    assert linear.system.B().shape == (12, 0) and linear.inputs == ()
-    assert linear.controller(np.zeros((0, 12)))(0.0, first_readings(linear.robot)).size == 0

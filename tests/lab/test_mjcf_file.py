@@ -27,13 +27,14 @@ from tetra_drake.robot.structure import moved_nodes
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.shipped import shipped_structures
 from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.settings.section import value_at
 
 mujoco = pytest.importorskip("mujoco")
 
 TEXTS = {file.stem: file.read_text("utf-8") for file in (DATA / "mjcf").glob("*.xml")}
 ROWS = yaml.safe_load(Path(__file__).with_name("mjcf.yaml").read_text("utf-8"))
+OTHERS = ROWS["others"]
 SPRING = 'stiffness="100" springlength="0 0.6" damping="2"'
-FREE = '<joint name="root" type="free" {}/>'
 
 
 def ball(tmp_path: Path, **parts: str) -> Path:
@@ -110,10 +111,8 @@ def test_a_robot_is_the_same_after_a_way_to_mujoco_and_back(name: str, tmp_path:
     assert (np.ptp(v_WN) > 0.5) == (name == "in motion")
     back = model_of(again)
     same = dict(rel=1e-9)
-    for body, number in zip(ours.bodies, range(1, model.nbody), strict=True):
-        at = back.body(body.replace(" ", "_")).id
-        assert back.body_mass[at] == approx(model.body_mass[number], **same)
-        assert back.body_inertia[at] == approx(model.body_inertia[number], **same)
+    assert back.body_mass == approx(model.body_mass, **same)
+    assert back.body_inertia == approx(model.body_inertia, **same)
     assert cables_of(back) == {path: approx(law, **same) for path, law in cables_of(model).items()}
     assert driven_by(again) == driven_by(robot)
     assert len(theirs.joints) == len(ours.joints)
@@ -128,21 +127,12 @@ def test_a_robot_is_the_same_after_a_way_to_mujoco_and_back(name: str, tmp_path:
 def test_what_a_file_of_others_says(tmp_path: Path) -> None:
     (tmp_path / "a.xml").write_text(TEXTS["others"])
     structure = converted(tmp_path / "a.xml")
-    assert structure.nodes["foot"] == approx([0, 0, 1])  # above the floor
-    assert structure.anchors == {"top_left": "xyz", "b_x": "xyz"}
-    assert [structure.struts["bar"].pairs, structure.contacts] == [[["high", "foot"]], ["foot"]]
-    assert structure.spheres["foot"].diameter == approx(0.5)
-    assert structure.gravity == approx(5.0)
-    rod = structure.bodies["rod"]
-    assert [rod.mass, rod.centre] == [approx(3.0), approx([0, 0, 2 - 1 / 3])]
-    t1, t2 = structure.cables["t"], structure.cables["t-2"]
-    assert [t1.stiffness, t1.free_length, t2.free_length] == [approx(10), approx(0.5), approx(1)]
-    assert [t2.stiffness, t2.damping] == [approx(20), approx(0.5)]
-    assert structure.actuated == {"wind_1": ["t-2 arm b_x"]}
+    tree = structure.model_dump()
+    assert {key: value_at(tree, key) for key in OTHERS["values"]} == {
+        key: approx(value) for key, value in OTHERS["values"].items()
+    }
     told = "\n".join(structure.ignored or [])
-    words = ("door", "wall", "t3", "t4", "flex", "'limited' of tendons, left out: t1", "1 0 -5")
-    assert all(word in told for word in words)
-    assert "t2" not in told
+    assert all(word in told for word in OTHERS["told"]) and "t2" not in told
 
 
 @pytest.mark.parametrize("parts", ROWS["rests"])
@@ -150,28 +140,12 @@ def test_a_robot_rests_where_it_rests_in_mujoco_at_control_0(parts, tmp_path: Pa
     assert left_at_rest(ball(tmp_path, **parts)) == approx([0.0, 0.0, 0.0], abs=1e-4)
 
 
-def test_what_acts_on_a_free_joint_is_told(tmp_path: Path) -> None:
-    acting = {"stiffness": 30, "damping": 3, "armature": 0.5, "frictionloss": 1}
-    given = " ".join(f'{name}="{value}"' for name, value in acting.items())
-    told = converted(ball(tmp_path, joint=FREE.format(given))).ignored
-    assert told == [f"the {name} of free joints, left out: root" for name in acting]
-
-
-def test_what_a_model_has_disabled_is_nothing(tmp_path: Path) -> None:
-    joint = FREE.format('stiffness="30" damping="3" frictionloss="1"')
-    off = '<flag damper="disable" frictionloss="disable" gravity="disable"/>'
-    file = ball(tmp_path, joint=joint, option=off, rope=f'{SPRING} range="0 0.4"')
-    structure = converted(file)
-    assert structure.gravity == 0.0
-    assert {cables.damping for cables in structure.cables.values()} == {0.0}
-    told = str(structure.ignored)
-    assert "'limited' of tendons, left out: rope" in told
-    assert "the stiffness of free joints" in told
-    assert "frictionloss" not in told
-    assert "the damping" not in told
-    for flag in ("limit", "constraint"):
-        file.write_text(file.read_text().replace("gravity=", f'{flag}="disable" gravity='))
-        assert "limited" not in str(converted(file).ignored)
+@pytest.mark.parametrize("row", ROWS["told"])
+def test_what_is_left_out_is_told_and_what_is_disabled_is_nothing(row, tmp_path: Path) -> None:
+    structure = converted(ball(tmp_path, **row["parts"]))
+    told, tree = "\n".join(structure.ignored or []), structure.model_dump()
+    assert {word: word in told for word in row["words"]} == row["words"]
+    assert {key: value_at(tree, key) for key in row["values"]} == row["values"]
 
 
 def lost_of(x: Any) -> np.ndarray:

@@ -1,9 +1,11 @@
 """Files of NTRT: a prism and a spine, read into structures."""
 
+import functools
 import json
 import math
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,10 +16,10 @@ from tetra_drake.errors import InputError
 from tetra_drake.lab.bridges.conversion import converted
 from tetra_drake.lab.bridges.ntrt import ntrt_tree
 from tetra_drake.lab.study.equilibrium import robot_of_structure
-from tetra_drake.lab.study.statics import find_statics
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario, save_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.settings.section import value_at
 
 TEXTS = {file.stem: file.read_text("utf-8") for file in (DATA / "ntrt").glob("*.yaml")}
 ROWS = yaml.safe_load(Path(__file__).with_name("ntrt.yaml").read_text("utf-8"))
@@ -35,41 +37,19 @@ def read(file: Path, unit: float = 0.1) -> StructureFile:
     return StructureFile.from_tree(ntrt_tree(file, unit=unit), file)
 
 
-def test_a_prism_in_decimetres() -> None:
-    given = read(DATA / "ntrt/prism.yaml")
-    rod, side = given.struts["prism_rod"], given.cables["vertical/string"]
-    assert (rod.diameter, rod.density, rod.node_diameter) == pytest.approx((0.05, 500.0, 0.0))
-    assert (side.stiffness, side.damping, side.tension) == pytest.approx((800.0, 5.0, 120.0))
-    default = given.cables["horizontal/string"]
-    assert (default.stiffness, default.damping, default.tension) == (1000.0, 10.0, 0.0)
-    names = {"horizontal/string low1 low2", "vertical/string low1 high1"}
-    assert names < {*given.blueprint().cable_names}
-    assert given.body_count == 3
+@functools.cache
+def example(name: str) -> dict[str, Any]:
+    """The content of an example in decimetres, and names, masses and radii of its parts."""
+    given = read(DATA / f"ntrt/{name}.yaml")
     blueprint = given.blueprint()
-    statics = find_statics(blueprint, blueprint.p_WN)
-    assert (len(statics.self_stresses), statics.mechanisms) == (1, 1)
-
-
-def test_a_spine_by_substructures() -> None:
-    given = read(DATA / "ntrt/spine.yaml")
-    blueprint = given.blueprint()
-    assert blueprint.bodies == ("v1", "v2", "v3")
-    rod = given.struts["rod"]  # by the default builder
-    assert (rod.diameter, rod.density) == pytest.approx((0.1, 1000.0))
-    assert given.nodes["v1/front"] == pytest.approx([0.1, 0.1, 0.2])
-    assert given.nodes["v2/front"] == pytest.approx([0.05, -0.1, 0.2])
-    assert given.nodes["v3/left"] == pytest.approx([0.4, -0.1, 0.0])
-    assert len(blueprint.cable_names) == 8
-    first_cables = ("string v1/front v2/front", "string v2/front v3/front")
-    assert blueprint.cable_names[:5:4] == first_cables
-
-
-def test_a_sphere_at_the_end_of_a_rod() -> None:
-    blueprint = read(DATA / "ntrt/ball.yaml").blueprint()
     radii = dict(zip(blueprint.node_names, blueprint.node_radius.tolist(), strict=True))
-    assert radii == pytest.approx({"low": 0.0, "high": 0.2}), "its node is where a rod ends"
-    rod, ball = 0.5 * math.pi * 0.25**2 * 10.0, 0.7 * 4.0 / 3.0 * math.pi * 2.0**3  # kg
-    assert Structure.of(blueprint).mass == pytest.approx([rod + ball])
+    parts = {"bodies": blueprint.bodies, "cable_names": blueprint.cable_names, "radii": radii}
+    return given.model_dump() | parts | {"masses": Structure.of(blueprint).mass.tolist()}
+
+
+@pytest.mark.parametrize(("name", "key", "value"), ROWS["examples"])
+def test_an_example_is_read(name: str, key: str, value: Any) -> None:
+    assert value_at(example(name), key) == pytest.approx(value)
 
 
 def test_a_bond_of_nodes_and_edges_moves_the_second_part_and_replaces_cables():

@@ -6,6 +6,7 @@ import multiprocessing
 import signal
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -16,7 +17,6 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, InputError
 from tetra_drake.lab.stepping.simulation import Simulation
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.scenario import Scenario
 
@@ -64,7 +64,9 @@ def brief(scenario: Scenario, actuation: dict, steps: int, *, periods: int = 6) 
 
 @pytest.mark.parametrize("count", [1, LANES])
 @pytest.mark.parametrize(("actuation", "steps"), ACTUATIONS)
-def test_steps_with_the_samples_of_a_command_give_its_motion(short, actuation, steps, count):
+def test_steps_and_a_controller_with_the_samples_of_a_command_give_its_motion(
+    short, actuation, steps, count
+):
     scenario = brief(short, actuation, steps)
     simulation = Simulation(scenario, count=count, record=True, workers=1)
     period, actions = simulation.control_period, drawn_actions(simulation)[:6]
@@ -72,7 +74,10 @@ def test_steps_with_the_samples_of_a_command_give_its_motion(short, actuation, s
     for robot in (0, count - 1):
         command = Command("drawn", period, actions[:, robot])
         expected = simulate(scenario, command=command, record=True)
+        controller = Mock(side_effect=[*actions[:, robot]])
+        controlled = simulate(scenario, controller=controller, record=True)
         result, trajectory = simulation.result(robot), expected.trajectory
+        assert controlled.trajectory.equals(trajectory) and controller.call_count == 6
         assert result.trajectory.equals(trajectory), "bit for bit"
         assert result.integrator == expected.integrator
         assert result.metrics.distance == expected.metrics.distance
@@ -84,32 +89,6 @@ def test_steps_with_the_samples_of_a_command_give_its_motion(short, actuation, s
             np.testing.assert_allclose(held, actions[:, robot], atol=1e-9)
             assert np.array_equal(trajectory.signal[0], actions[0, robot])
     assert found[-1].time.tolist() == pytest.approx([6 * period] * count)
-
-
-@pytest.mark.parametrize(("actuation", "steps"), ACTUATIONS)
-def test_a_controller_that_gives_the_samples_of_a_command_gives_its_motion(
-    short, engine, actuation, steps
-):
-    actions = drawn_actions(Simulation(brief(short, actuation, steps)))[:6, 0]
-    scenario = brief(short, actuation, steps).with_changes({"engine": engine})
-    period, seen = scenario.simulation.control_period, []
-
-    def controller(time: float, readings: Readings) -> np.ndarray:
-        seen.append(readings)
-        return actions[len(seen) - 1]
-
-    found = simulate(scenario, controller=controller, record=True)
-    expected = simulate(scenario, command=Command("drawn", period, actions), record=True)
-    trajectory = expected.trajectory
-    np.testing.assert_allclose(found.trajectory.p_WN, trajectory.p_WN, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.trajectory.signal, trajectory.signal, rtol=0, atol=1e-9)
-    times = [float(readings.time) for readings in seen]
-    assert times == pytest.approx(period * np.arange(6), abs=1e-9), "asked once in each period"
-    for name, readings in READINGS.items():
-        read = np.array([getattr(each, readings) for each in seen[1:]])
-        np.testing.assert_allclose(read, trajectory[name][2:-2:2], rtol=0, atol=1e-6)
-    if engine == "!Compiled":
-        assert found.trajectory.equals(trajectory), "bit for bit"
 
 
 def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):

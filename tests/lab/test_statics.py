@@ -47,7 +47,7 @@ def test_a_prism_that_is_turned_a_degree_further_has_neither():
 @pytest.mark.parametrize("name", ["mast", "pair"])
 def test_the_shipped_spines_balance_without_weight(name: str) -> None:
     blueprint = read_structure(name).blueprint()
-    laws = np.array([[law["stiffness"], law["free_length"]] for law in blueprint.cable_laws])
+    laws = np.array([[law.stiffness, law.free_length] for law in blueprint.cable_laws])
     spans = blueprint.p_WN[blueprint.segments.ends]
     tensions = laws[:, 0] * (np.linalg.norm(spans[:, 1] - spans[:, 0], axis=1) - laws[:, 1])
     assert tensions.min() > 1.0

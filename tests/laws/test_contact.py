@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from helpers.robot_on_ground import RobotOnGround
 
-from tetra_drake.laws.contact import CONTACT, MODE, STICK_POINT, NormalForce, normal_force
+from tetra_drake.laws.contact import MODE, STICK_POINT, NormalForce, normal_force
 from tetra_drake.laws.friction import STICK
-from tetra_drake.laws.kinematics import FORCE
-from tetra_drake.scenario.scenario import Scenario
 
 NORMAL = NormalForce(stiffness=4000.0, damping=2e5)
 
@@ -16,11 +14,6 @@ def test_normal_force_is_equation_1():
     # k d + lambda d dd/dt = 4000*1e-3 + 2e5*1e-3*0.01 = 4 + 2; 4 - 6 < 0: it does not pull.
     assert normal_force(1e-3, 0.01, NORMAL) == pytest.approx(6.0, rel=1e-14)
     assert normal_force(1e-3, -0.03, NORMAL) == normal_force(-1e-4, 0.02, NORMAL) == 0.0
-
-
-@pytest.fixture
-def robot_on_ground(scenario: Scenario) -> RobotOnGround:
-    return RobotOnGround(scenario, np.eye(3))
 
 
 def test_a_node_that_sticks_again_does_so_where_it_is_and_changes_are_told(scenario):
@@ -40,13 +33,3 @@ def test_a_node_that_sticks_again_does_so_where_it_is_and_changes_are_told(scena
         assert modes[0, STICK_POINT] == pytest.approx(stick_point, abs=1e-15)
         assert modes[0, MODE + 1] == STICK, "the sideways axis is on its own"
     assert robot_on_ground.update(p=lifted), "leaves the ground"
-
-
-def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(robot_on_ground):
-    robot_on_ground.modes[:, CONTACT] = robot_on_ground.modes[:, MODE] = 1.0
-    v, lifted = (0.1, 0.0, 0.0), (0.0, 0.0, 1e-3)
-    robot_on_ground.update(v, lifted)
-    assert not robot_on_ground.modes[:, : MODE + 2].any()
-    nodes, ground_forces = robot_on_ground.forces(v, lifted)
-    assert not ground_forces.any()
-    assert not nodes[:, FORCE:].any()

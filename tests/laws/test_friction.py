@@ -9,7 +9,6 @@ from tetra_drake.laws.friction import (
     STICK,
     CoulombConstants,
     ResetConstants,
-    ResetIntegrator,
     Slide,
     TangentSlide,
     coulomb_damping,
@@ -40,16 +39,6 @@ def test_reset_friction_is_equation_5_with_the_absolute_speed(velocity, stiffnes
     mode = math.copysign(1.0, share)
     slipping = tangent_force(TangentSlide(velocity, 12.3, mode), law)
     assert slipping == pytest.approx(-mode * per_length * P0, rel=1e-14)
-
-
-VISCOUS = [({}, True), ({"reset": "reversal"}, False), ({"stiffness": OLSSON}, False)]
-VISCOUS += [({"stiction_damping": 1.0}, False)]
-
-
-@pytest.mark.parametrize(("changes", "viscous"), VISCOUS)
-def test_friction_is_viscous_where_nodes_never_slip_and_a_bristle_adds_little(changes, viscous):
-    thesis = dict(zip(ResetConstants._fields, (P0, SIGMA_1, A_C, SIGMA_0), strict=False))
-    assert ResetIntegrator(**thesis | changes).is_viscous == viscous
 
 
 def test_friction_is_proportional_to_the_load_where_a_load_is_given():

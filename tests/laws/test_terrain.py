@@ -49,30 +49,6 @@ def saved(heights: np.ndarray, folder) -> str:
     return str(folder / "heights.npy")
 
 
-def test_a_lonely_height_is_a_biquadratic_spline(ground, tmp_path):
-    # The quadratic B-spline is 3/4 at its control point, 1/2 half a cell away, 1/8 a cell away.
-    heights = np.zeros((101, 9))
-    heights[53, 5] = -1.0
-    made = ground(HeightField(file=saved(heights, tmp_path), cell=0.4))
-    for dx, dy, expected in [(0, 0, 0.75 * 0.75), (0.2, 0, 0.5 * 0.75), (-0.4, 0.4, 1 / 64)]:
-        assert at(made, 1.2 + dx, 0.4 + dy)[0] == pytest.approx(-expected, abs=1e-13)
-    assert at(made, 1.2 + 0.61, 0.4) == (0.0, 0.0, 0.0), "one and a half cells away"
-
-
-@pytest.mark.parametrize(
-    "terrain", [ROUGH, Steps(height=0.25 * INCH, depth=6.0 * INCH, count=3, start=20.0 * INCH)]
-)
-def test_the_gradient_is_that_of_the_heights_and_continuous(ground, terrain):
-    made, h = ground(terrain), 1e-7
-    for x, y in np.random.default_rng(0).uniform(-0.5, 1.5, (200, 2)):
-        _, *gradient = at(made, x, y)
-        ends = [
-            [at(made, x + side * i, y + side * j)[0] for side in (-h, h)]
-            for i, j in ((1, 0), (0, 1))
-        ]
-        assert gradient == pytest.approx(np.diff(ends)[:, 0] / (2 * h), abs=1e-6)
-
-
 def test_beyond_the_grid_the_surface_goes_on_as_it_is_at_the_edge(ground, tmp_path):
     x = 0.5 * np.arange(-4, 5)[:, np.newaxis]
     made = ground(HeightField(file=saved(0.1 * x + np.zeros((9, 7)) - 0.5, tmp_path), cell=0.5))

@@ -59,16 +59,6 @@ def fitnesses(batches):
     return np.array([bowl(vector).fitness for batch in batches for vector in batch])
 
 
-@pytest.mark.parametrize("kind", ALL)
-def test_the_generator_alone_decides_what_is_asked_for(kind):
-    before = str(np.random.get_state())
-    first, same, other = (np.concatenate(run(kind, seed=s, budget=101)[0]) for s in (3, 3, 4))
-    assert len(first) == 101
-    np.testing.assert_array_equal(first, same)
-    assert not np.array_equal(same, other)
-    assert str(np.random.get_state()) == before
-
-
 def test_digits_do_not_depend_on_the_threads_of_linear_algebra():
     # Of a matrix with some 145 rows. This tells on a machine with two cores or more.
     asked = []
@@ -78,19 +68,6 @@ def test_digits_do_not_depend_on_the_threads_of_linear_algebra():
         asked.append(np.concatenate(batches))
     assert asked[0].shape[1] > 140
     np.testing.assert_array_equal(*asked)
-
-
-@pytest.mark.parametrize("kind", ALL)
-def test_what_is_asked_for_can_be_changed_without_harm(kind):
-    def spoiling(vector):
-        evaluation = bowl(vector)
-        vector[:] = 0.0
-        return evaluation
-
-    spoilt, whole = make(kind), make(kind)
-    optimise(spoilt, spoiling, 100)
-    optimise(whole, bowl, 100)
-    np.testing.assert_array_equal(spoilt.ask(), whole.ask())
 
 
 @pytest.mark.parametrize("kind", LEARNING)
@@ -122,13 +99,6 @@ def test_parameters_with_equal_bounds_stay_and_tau_b_may_go_its_own_way(kind):
     assert (free[:, TAU_B] >= 0.4).all()
     if kind != RandomSearch():  # random gaits are always coupled
         assert (free[:, TAU_B] != 2.0 * free[:, TAU_A]).mean() > 0.4
-
-
-@pytest.mark.parametrize("kind", BUDGETED)
-def test_one_parameter_is_enough(kind):
-    vectors = np.concatenate(run(kind, **{"robot.tetrahedra": 2})[0])
-    assert vectors.shape == (600, 2)
-    assert vectors[:, TAU_A].min() < 0.205
 
 
 @pytest.mark.parametrize("kind", LEARNING)

@@ -21,12 +21,6 @@ from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.scenario.load import load_scenario
 
 
-def test_of_a_run_the_fittest_gait_is_simulated(run, tiny):
-    stored = load_or_simulate(run)
-    assert stored.gait.name == "tiny, seed 7, trial 1, evaluation 4"
-    assert stored.scenario.robot == tiny.robot
-
-
 def test_sources_without_motion_and_bad_places_are_refused(tmp_path, folder, run, refused):
     failed = write_run(tmp_path / "failed", [[[(None, 0)]]])
     with refused(failed, "", ""):

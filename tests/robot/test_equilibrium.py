@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from helpers.quantities import with_unit
 
-from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Incline
 from tetra_drake.robot import equilibrium
-from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, TIP
@@ -30,16 +28,6 @@ def test_rests_where_the_independent_simulation_does(robot, data):
     normal = robot.scenario.ground.stiffness * depth / POUND_FORCE
     atol = 1e-5 * expected["normal_sum_lbf"]
     np.testing.assert_allclose(normal, expected["normals"], atol=atol)
-
-
-def test_a_walk_that_is_not_driven_ends_there(scenario):
-    # Feet creep under stiction: an error of 3 mm at the start falls to 2e-7 of a length in 20 s.
-    still = {"cpg.start_up": "100.0 s", "simulation.duration": "20.0 s", "engine": "!Compiled"}
-    # Base triangles so near that the robot tips forward, onto the lead's tip.
-    still |= {"robot.tetrahedra": 2, "robot.spacing": "0.055 m"}
-    scenario = scenario.with_changes(still | {"robot.cables.inner_stiffness": "26.0 N/m"})
-    walk = simulate(scenario=scenario, gait=seeded_gait(scenario, 0), record=True).trajectory
-    np.testing.assert_allclose(walk.length[-1], Robot.of(scenario).equilibrium.lengths, rtol=1e-6)
 
 
 def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario, robot):
@@ -63,20 +51,6 @@ def test_forces_that_are_not_finite_end_the_search_at_once(scenario, robot, wher
         equilibrium_of(scenario, robot.structure, start)
 
 
-def test_a_step_whose_end_has_no_forces_is_too_long(robot, monkeypatch):
-    """Such as one on which the ends of a cable meet."""
-    expected, displaced, steps = robot.equilibrium.lengths, equilibrium.displaced, []
-
-    def first_meeting(resting, state, step):
-        steps.append(np.abs(step).max())
-        return displaced(resting, state, step if len(steps) > 1 else math.nan * step)
-
-    monkeypatch.setattr(equilibrium, "displaced", first_meeting)
-    again = Robot.of(robot.scenario).equilibrium
-    assert steps[1] <= 0.5 * steps[0]
-    assert np.array_equal(again.lengths, expected)
-
-
 def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
     monkeypatch.setattr(equilibrium, "LONG", -1.0)
     rest = robot.equilibrium
@@ -85,7 +59,7 @@ def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
     assert rest.feet
 
 
-@pytest.mark.parametrize(("work", "steps"), [(2.5 * 28365, 2), (0.0, 1)])  # 5 bodies
+@pytest.mark.parametrize(("work", "steps"), [(2.5 * 6981, 2), (0.0, 1)])  # 5 bodies
 def test_a_search_ends_after_steps_by_the_robot_alone(robot, refused, monkeypatch, work, steps):
     monkeypatch.setattr(equilibrium, "MOST_WORK", work)
     monkeypatch.setattr(equilibrium, "LEAST_STEPS", 1)

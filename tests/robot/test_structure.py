@@ -3,12 +3,9 @@
 import numpy as np
 import pytest
 from helpers.states import disturbed
-from pydrake.multibody.plant import MultibodyPlant
 
-from tetra_drake.laws.kinematics import V_WN
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import AddBodies, AddNodes, moved_nodes, node_positions
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.robot.structure import node_positions
 
 
 def test_a_tetrahedron_has_the_mass_and_the_inertia_of_the_thesis_in_all_directions(structure):
@@ -30,23 +27,6 @@ def test_a_payload_adds_mass_and_weight_but_no_inertia_about_the_centre(scenario
     assert loaded.model.bodies.inertia == pytest.approx(moments, rel=1e-14)
     assert loaded.structure.p_BN == pytest.approx(structure.p_BN, abs=0.0)
     assert loaded.structure.isotropic
-
-
-@pytest.mark.parametrize("name", ["thesis", "prism", "mast"])
-def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(name):
-    # This needs the plant's state to run body by body, in the structure's order.
-    structure = Robot.of(load_scenario(name)).structure
-    plant = MultibodyPlant(time_step=0.0)
-    bodies = AddBodies(plant, structure)
-    frames = AddNodes(plant, structure, bodies)
-    plant.Finalize()
-    context, state = plant.CreateDefaultContext(), disturbed(structure, 0, pose=1.0, speed=1.0)
-    plant.SetPositionsAndVelocities(context, state)
-    p_WN = [frame.CalcPoseInWorld(context).translation() for frame in frames]
-    v_WN = [frame.CalcSpatialVelocityInWorld(context).translational() for frame in frames]
-    assert node_positions(structure, state) == pytest.approx(np.array(p_WN), abs=1e-12)
-    found = moved_nodes(structure, state)[:, V_WN : V_WN + 3]
-    assert found == pytest.approx(np.array(v_WN), abs=1e-12)
 
 
 def test_a_quaternion_that_drifted_off_unit_length_still_is_a_rotation(structure):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.structures import driven_as_recorded, recorded_structure, unit_inertias
 from pydrake.multibody.tree import SpatialInertia
+from scipy.spatial.distance import pdist
 
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import NORMAL
@@ -21,7 +22,7 @@ def test_rests_where_the_independent_simulation_does(name, data):
     ours = node_positions(structure, structure.initial_state)
     theirs = np.array([recorded["nodes_at_rest"][node] for node in structure.node_names])
     np.testing.assert_allclose(ours[:, 2], theirs[:, 2], atol=1e-6)
-    np.testing.assert_allclose(distances(ours), distances(theirs), atol=1e-6)
+    np.testing.assert_allclose(pdist(ours), pdist(theirs), atol=1e-6)
 
     resting = Unactuated(robot.model)
     force_at_rest(resting, structure.initial_state)
@@ -31,11 +32,6 @@ def test_rests_where_the_independent_simulation_does(name, data):
     np.testing.assert_allclose(resting.forces.cable_forces[:, TENSION], expected, rtol=1e-6)
     assert resting.forces.ground_forces[:, NORMAL].sum() == pytest.approx(robot.weight, rel=1e-9)
     assert robot.equilibrium.feet == np.count_nonzero(theirs[:, 2] < 0.0) == 3
-
-
-def distances(p_WN: np.ndarray) -> np.ndarray:
-    """Of all nodes from each other."""
-    return np.linalg.norm(p_WN[:, np.newaxis] - p_WN, axis=2)
 
 
 def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():

@@ -38,19 +38,6 @@ def test_what_is_no_entry_is_refused(tmp_path, text, key):
     assert caught.value.key == key and "\n" not in str(caught.value)
 
 
-def test_shares_are_of_the_best_interquartile_mean():
-    values = {"good": [0.0, 2.0, 2.0, 100.0], "bad": [1.0, 1.0, 1.0, 1.0]}
-    records = []
-    for entry, scores in values.items():
-        row = {"task": "walk", "entry": entry}
-        records += [row | {"seed": seed, "score": score} for seed, score in enumerate(scores)]
-    of_entries = bench.shares(records)
-    assert of_entries["bad"]["walk"].tolist() == [0.5] * 4
-    assert bench.overall(of_entries["good"])[0] == 1.0
-    assert bench.overall(of_entries["bad"]) == (0.5, 0.5, 0.5)
-    assert bench.entry_names(records) == ["good", "bad"]
-
-
 def test_every_entry_of_the_folder_is_in_the_records():
     entries = {bench.Entry.of(file).name for file in bench.ENTRIES.glob("*.py")}
     assert entries <= {one["entry"] for one in bench.read(bench.HERE / bench.RECORDS)}

@@ -1,7 +1,5 @@
 """Trial and error after damage: its choices on a made-up map, its records, and its page."""
 
-import functools
-
 import damage
 import numpy as np
 import pytest
@@ -9,17 +7,9 @@ import pytest
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import load_run
 
-load_once = functools.cache(load_run)
-
-
-@pytest.fixture(autouse=True)
-def read_once(monkeypatch):
-    """The walker's run is read once."""
-    monkeypatch.setattr(damage, "load_run", load_once)
-
 
 def test_a_gait_for_each_motor_is_the_recorded_one():
-    run = load_once(damage.WALKER)
+    run = load_run(damage.WALKER)
     same = simulate(damage.scenario(), damage.steered(run.best_gait(), 0.0))
     recorded = simulate(run.scenario, run.best_gait()).metrics.steady_distance
     assert same.metrics.steady_distance == pytest.approx(recorded, abs=1e-4)

@@ -17,12 +17,6 @@ FEW |= {"disturbances": {"draws": 2, "start": 0.05}}
 TINY = record.Experiment("two tetrahedra", "thesis", BRIEF | FEW)
 
 
-def other(**changes):
-    """The experiment with changes of its scenario; `__` stands for a dot."""
-    changed = {key.replace("__", "."): value for key, value in changes.items()}
-    return record.Experiment(TINY.title, TINY.base, TINY.changes | changed)
-
-
 def recorded(experiment, directory):
     evolve(experiment.scenario("tiny"), directory, reevaluate=False, report=False)
     thinned = directory.with_name(f"{directory.name} thinned")
@@ -37,7 +31,8 @@ def tiny(tmp_path_factory):
 
 
 def test_the_keys_that_differ_are_named(tiny):
-    stiffer = other(robot__cables__outer_stiffness="0.3 lbf/in")
+    changes = TINY.changes | {"robot.cables.outer_stiffness": "0.3 lbf/in"}
+    stiffer = record.Experiment(TINY.title, TINY.base, changes)
     assert "robot.cables.outer_stiffness" in outdated.why_outdated("tiny", stiffer, tiny)
 
 

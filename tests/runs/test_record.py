@@ -1,5 +1,7 @@
 """Making recorded runs: what is done is kept, and what is written can be read."""
 
+from unittest.mock import Mock
+
 import pytest
 import record
 from analyse import ANALYSIS
@@ -14,27 +16,21 @@ FEW = {"robot.tetrahedra": 2, "optimizer": MAP, "evolution.trials": 2, "evolutio
 TINY = record.Experiment("two tetrahedra", "thesis", BRIEF | FEW, film=True)
 
 
-@pytest.fixture
-def analysed(monkeypatch):
-    """An analysis and pictures that take no time; the folders that were analysed."""
-    analysed = []
+def analyse(directory, *, workers):
+    """An analysis that takes no time."""
+    (directory / ANALYSIS).write_text("{}")
 
-    def analyse(directory, *, workers):
-        analysed.append(directory)
-        (directory / ANALYSIS).write_text("{}")
 
-    monkeypatch.setattr(record, "analyse", analyse)
-
-    def take_pictures(page, *pictures):
-        for picture in pictures:
-            picture.touch()
-
-    monkeypatch.setattr(record, "take_pictures", take_pictures)
-    return analysed
+def take_pictures(page, *pictures):
+    for picture in pictures:
+        picture.touch()
 
 
 @pytest.mark.slow
-def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed):
+def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, monkeypatch):
+    analysed = Mock(side_effect=analyse)
+    monkeypatch.setattr(record, "analyse", analysed)
+    monkeypatch.setattr(record, "take_pictures", take_pictures)
     scratch, out = tmp_path / "scratch", tmp_path / "runs"
     (out / "tiny/trial_07").mkdir(parents=True)  # of an older run
     kept = {"README.md", "map.png", "readings.json"}
@@ -51,4 +47,4 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     (out / "tiny" / ANALYSIS).unlink()  # as if interrupted
     record.record("tiny", TINY, scratch=scratch, out=out)
     assert load_run(out / "tiny").evaluations.equals(run.evaluations)
-    assert analysed == [scratch / "tiny"]
+    assert [call.args for call in analysed.call_args_list] == [(scratch / "tiny",)]

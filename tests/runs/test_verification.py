@@ -9,7 +9,6 @@ import verification
 from tetra_drake.errors import SimulationFailure
 
 RESULTS = json.loads((verification.HERE / verification.RESULTS).read_text("utf-8"))
-FAMILIES = {problem["family"] for problem in verification.PROBLEMS.values()}
 LEAST = 1e-10
 """Errors below this are of rounding."""
 
@@ -23,7 +22,7 @@ def check(name: str, engine: str) -> None:
         fails = pytest.raises(SimulationFailure) if "failure" in known else nullcontext()
         with fails:
             default = verification.ENGINES[engine]["default"]
-            error = verification.run(verification.completed(name), default)["error"]
+            error = verification.run(verification.PROBLEMS[name], default)["error"]
         if "failure" in known:
             return
     assert error <= max(3.0 * known["error"], LEAST), (name, engine)
@@ -42,8 +41,12 @@ QUICK = ["bead", "tether", "projectile", "backspin", "hoop", "stopping"]
 QUICK += ["stick_slip", "prism_modes"]
 
 
+SLOW = {name: [] if name in QUICK else [pytest.mark.slow] for name in RESULTS}
+
+
 @pytest.mark.parametrize(
-    ("name", "engine"), [(name, engine) for name in QUICK for engine in RESULTS[name]["engines"]]
+    ("name", "engine"),
+    [pytest.param(n, e, marks=SLOW[n]) for n in RESULTS for e in RESULTS[n]["engines"]],
 )
 def test_an_error_is_as_on_the_page(name, engine):
     check(name, engine)
@@ -52,11 +55,3 @@ def test_an_error_is_as_on_the_page(name, engine):
 def test_the_engines_have_the_orders_of_their_methods():
     orders = {name: numbers["order"] for name, numbers in RESULTS["brick"]["engines"].items()}
     assert orders == pytest.approx({"compiled": 2.0, "drake": 3.0, "mujoco": 1.0}, abs=0.15)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("family", sorted(FAMILIES))
-def test_errors_of_a_family_are_as_on_the_page(family):
-    for name, problem in verification.PROBLEMS.items():
-        for engine in RESULTS[name]["engines"] if problem["family"] == family else ():
-            check(name, engine)

@@ -25,13 +25,15 @@ def test_the_example_has_what_its_page_says() -> None:
     assert blueprint.cable_names == ("guy left mid", "guy right mid", "sling left west east right")
     assert blueprint.cable_rings == {2: (names.index("west"), names.index("east"))}
     length = 20.0 + 2.0 * np.hypot(20.0, 82.0)
-    assert blueprint.cable_laws[2]["free_length"] == pytest.approx(0.01 * length - 1.0 / 500.0)
+    assert blueprint.cable_laws[2].free_length == pytest.approx(0.01 * length - 1.0 / 500.0)
     assert blueprint.groups == ((2,),)
     pairs = [[names[node] for node in joint] for joint in blueprint.joints]
     assert blueprint.joint_keys == ("joints.knee", "joints.mid-2")
     assert pairs == [["low", "eye"], ["mid", "mid-2"]]
     # The sling and two guys of 500 N/m.
     assert blueprint.joint_stiffness.tolist() == pytest.approx([1e5, 1e3 * 3 * 500.0])
+    given = structure_of("crane", "joint_stiffness: 3 kN/m").blueprint()
+    assert given.joint_stiffness.tolist() == [1e5, 3e3]
     assert blueprint.joint_damping == pytest.approx(1e-3 * blueprint.joint_stiffness)
     assert blueprint.anchor_stiffness[names.index("top")] == pytest.approx([1.5e6] * 3)
     [(body, given)] = blueprint.given_inertia.items()

@@ -5,6 +5,7 @@ import pytest
 from pytest import approx
 
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.settings.section import value_at
 
 DAMPING, RANGE, OTHER = "robot.cables.damping", "friction.stiction_range", "robot.density"
 ROUGH = {"terrain": "!Rough {amplitude: 0.1 in, wavelength: 2 in}"}
@@ -18,7 +19,10 @@ def among(scenario, spreads, *, start=0.1, **changes):
 
 def test_a_draw_changes_what_it_names_within_its_spread(scenario):
     spreads = {DAMPING: 0.1, f"{RANGE}, friction.stiction_damping": 0.05}
-    scenario = among(scenario, spreads, start=0.02)
+    spreads |= {"events[0].push.impulse[2]": 0.5, "robot.start.velocity[2]": 0.2}
+    push = {"at": "0.1 s", "push": {"impulse": ["0 N*s", "0 N*s", "0.02 N*s"], "on": "T1"}}
+    moving = {"robot.start": {"velocity": ["0 m/s", "0 m/s", "2 m/s"]}, "events": [push]}
+    scenario = among(scenario, spreads, start=0.02, **moving)
     draws = [draw_disturbances(scenario, (7, k)) for k in range(200)]
     for key, spread in spreads.items():
         factors = np.array([draw.factors[key] for draw in draws])
@@ -27,14 +31,13 @@ def test_a_draw_changes_what_it_names_within_its_spread(scenario):
         assert np.ptp(factors) > 1.9 * spread
     drawn = np.array([[*draw.factors.values(), *draw.moves[0, :2]] for draw in draws])
     # Each is drawn alone: the bound is 4 standard deviations of independent numbers.
-    assert np.abs(np.corrcoef(drawn.T) - np.eye(4)).max() < 0.28
+    assert np.abs(np.corrcoef(drawn.T) - np.eye(6)).max() < 0.28
     draw, changed = draws[0], disturbed(scenario, draws[0])
-    expected = scenario.numbers()
-    for names, factor in draw.factors.items():
-        for key in names.split(", "):
-            expected[key] *= factor
-    numbers = changed.numbers()
-    assert {key: numbers[key] for key in expected} == approx(expected, rel=1e-15)
+    factors = {key: x for names, x in draw.factors.items() for key in names.split(", ")}
+    before, after = (each.model_dump() for each in (scenario, changed))
+    for key in {*scenario.numbers(), *factors}:
+        expected = value_at(before, key) * factors.get(key, 1.0)
+        assert value_at(after, key) == approx(expected, rel=1e-15)
     moves = np.array([draw.moves for draw in draws]) / scenario.robot.spacing
     assert moves.shape == (200, 5, 3)
     assert 0.0195 < np.abs(moves).max() <= 0.02

@@ -28,7 +28,7 @@ def test_a_structure_has_what_its_file_says_in_si() -> None:
     assert blueprint.cable_keys[1] == "cables.side.pairs[1]"
     assert (blueprint.oscillators, blueprint.groups) == (("left", "right"), ((0, 2), (1,)))
     length = np.hypot(0.07, 0.10)
-    free_lengths = [law["free_length"] for law in blueprint.cable_laws]
+    free_lengths = [law.free_length for law in blueprint.cable_laws]
     assert free_lengths == pytest.approx([0.02, 0.02, length - 2 / 100])
     assert [blueprint.node_names[node] for node in blueprint.contacts] == ["a", "g"]
     assert structure_of("small", "contacts: all").blueprint().contacts.tolist() == list(range(7))

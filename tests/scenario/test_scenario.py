@@ -1,10 +1,10 @@
 """Scenario files: the thesis's numbers, files based on files, dumping, and differences."""
 
-import functools
 from pathlib import Path
 
 import pytest
 import yaml
+from helpers.anchored import load_once
 from record import EXPERIMENTS
 
 from tetra_drake.robot.remarks import start_up_remark
@@ -31,7 +31,6 @@ def test_the_thesis_scenario_holds_the_numbers_of_the_thesis(scenario):
     assert scenario.disturbances is None
 
 
-load_once = functools.cache(load_scenario)
 RUNS = Path(__file__).parents[2] / "runs"
 
 
@@ -77,8 +76,8 @@ def test_differences_are_keys_and_readable_values(scenario):
     changes |= {"optimizer.stop_rise": 0.1 + 0.2, "friction.stiction_damping": "0.3 lbf*s/in"}
     changed = scenario.with_changes(changes | {"robot.offsets": [["1 mm", 0, 0]] * 5})
     assert changed.differences(scenario) == [
-        ("robot.cables.slack", "true"),
         ("robot.offsets", f"[{', '.join(['[1 mm, 0, 0]'] * 5)}]"),
+        ("robot.cables.slack", "true"),
         ("friction.stiction_damping", "0.3 lbf*s/in"),
         ("cpg.signals", "listing"),
         ("optimizer.stop_rise", "0.3"),

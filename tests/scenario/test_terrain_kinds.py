@@ -1,7 +1,6 @@
 """Terrains: the grids they become, the surfaces drawn from those, and what is refused."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,8 +8,15 @@ from helpers.laws import UNEVEN
 from scipy.interpolate import NdBSpline
 
 from tetra_drake.laws.height_field import HeightField
-from tetra_drake.laws.terrain import Grid, Obstacles, Relief, Rough, Steps, Terrain
-from tetra_drake.robot.robot import Robot
+from tetra_drake.laws.terrain import (
+    Grid,
+    Obstacles,
+    Rough,
+    Steps,
+    SurfaceGrid,
+    Terrain,
+    surface,
+)
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -22,11 +28,22 @@ def grid_of(terrain: Terrain) -> Grid:
     return terrain.grid(ahead=AHEAD, scale=1.0, source="file")
 
 
-def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """The biquadratic B-spline whose control points are the heights."""
+def spline(grid: Grid, x: np.ndarray, y: np.ndarray, nu: tuple[int, int] = (0, 0)) -> np.ndarray:
+    """The biquadratic B-spline whose control points are the heights, or a derivative of it."""
     axes = zip(grid.corner, grid.cell, grid.heights.shape, strict=True)
     knots = tuple(start + cell * (np.arange(size + 3) - 1.5) for start, cell, size in axes)
-    return NdBSpline(knots, grid.heights, k=2)(np.stack(np.broadcast_arrays(x, y), axis=-1))
+    places = np.stack(np.broadcast_arrays(x, y), axis=-1)
+    return NdBSpline(knots, grid.heights, k=2)(places, nu=nu)
+
+
+@pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
+def test_the_surface_is_the_spline_of_the_heights_with_its_gradient(terrain):
+    grid = grid_of(terrain)
+    base = SurfaceGrid.of(grid.heights, grid.corner, grid.cell, terrain.is_stepped)
+    for x, y in np.random.default_rng(0).uniform(-0.6, 0.7, (200, 2)):
+        expected = [spline(grid, x, y, nu) for nu in ((0, 0), (1, 0), (0, 1))]
+        found = surface(x, y, base, grid.heights.ravel())
+        np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
@@ -54,12 +71,12 @@ def test_stairs_have_their_treads_and_edges_in_place(height, start):
     grid = grid_of(Steps(height=height, depth=depth, count=count, start=start))
     first = AHEAD if start is None else start
     steps = np.arange(count)
-    treads = surface(grid, first + (np.arange(-1, count + 2) + 0.5) * depth, 0.01)
+    treads = spline(grid, first + (np.arange(-1, count + 2) + 0.5) * depth, 0.01)
     np.testing.assert_allclose(treads, height * np.array([0, 1, 2, 3, 3, 3]), atol=1e-12)
-    edges = surface(grid, first + steps * depth, -0.2)
+    edges = spline(grid, first + steps * depth, -0.2)
     np.testing.assert_allclose(edges, height * (steps + 0.5), atol=1e-12)
     # Level again a cell away, which is at most the height of a step.
-    beside = surface(grid, first + steps * depth + min(abs(height), depth / 4), 0.0)
+    beside = spline(grid, first + steps * depth + min(abs(height), depth / 4), 0.0)
     np.testing.assert_allclose(beside, height * (steps + 1), atol=1e-12)
 
 
@@ -189,18 +206,3 @@ def test_a_saved_field_does_not_need_the_file_it_was_read_from(tmp_path, damage,
     copy.unlink() if damage == "gone" else write_heights(copy, 2.0 * HEIGHTS)
     with refused(moved / SCENARIO, "terrain.file", copy.name):
         load_scenario(moved / SCENARIO)
-
-
-GRIDS = [(Grid(np.full((3, 3), np.nan), (-1.0, -1.0), (1.0, 1.0)), "nan in row 1")]
-GRIDS += [(Grid(np.zeros(9), (-1.0, -1.0), (1.0, 1.0)), "9 heights")]
-GRIDS += [(Grid(np.zeros((3, 3)), (-1.0, -1.0), (0.0, 1.0)), "cells of (0.0, 1.0) m")]
-
-
-@pytest.mark.parametrize(("grid", "fact"), GRIDS)
-def test_the_grid_of_a_kind_is_held_to_what_a_height_file_is(grid, fact, refused):
-    class Odd(Relief):
-        def grid(self, **_: Any) -> Grid:
-            return grid
-
-    with refused("!Odd", "grid", fact):
-        Robot.of(load_scenario("prism").with_sections(terrain=Odd()))

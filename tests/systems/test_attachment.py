@@ -9,6 +9,7 @@ import warnings
 import numpy as np
 import pytest
 from helpers.rod import GRAVITY, LAW, LEFT, LENGTH, MASS, RIGHT, rod_with_tendons
+from pydrake.autodiffutils import ExtractValue
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
@@ -25,17 +26,11 @@ from tetra_drake.robot.ground import make_surface
 from tetra_drake.systems import AddCables, AddGroundContact, Cable
 
 
-def simulated(diagram: Diagram, time: float, *, accuracy: float = 1e-6) -> Simulator:
+def simulated(diagram: Diagram, time: float) -> Simulator:
     simulator = Simulator(diagram)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.05).set_target_accuracy(accuracy)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.05).set_target_accuracy(1e-6)
     simulator.AdvanceTo(time)
     return simulator
-
-
-def state_at(diagram: Diagram, time: float, *, accuracy: float = 1e-6) -> np.ndarray:
-    plant = diagram.GetSubsystemByName("plant")
-    root = simulated(diagram, time, accuracy=accuracy).get_context()
-    return plant.GetPositionsAndVelocities(plant.GetMyContextFromRoot(root))
 
 
 def test_an_arm_comes_to_rest_where_two_tendons_balance_its_weight():
@@ -43,7 +38,8 @@ def test_an_arm_comes_to_rest_where_two_tendons_balance_its_weight():
     # constant, for the direction u of the rod and the anchors a and b.
     builder, plant, _, cables = rod_with_tendons()
     AddCables(builder, plant, cables=cables)
-    angle, rate = state_at(builder.Build(), 4.0)
+    context = plant.GetMyContextFromRoot(simulated(builder.Build(), 4.0).get_context())
+    angle, rate = plant.GetPositionsAndVelocities(context)
     pull = LAW.stiffness * (LEFT + RIGHT) - 0.5 * MASS * GRAVITY * np.array([0.0, 0.0, 1.0])
     assert angle == pytest.approx(math.atan2(pull[2], pull[0]), abs=1e-6)
     assert rate == pytest.approx(0.0, abs=1e-6)
@@ -122,3 +118,8 @@ def test_shown_pieces_cover_a_cable_of_any_length_from_end_to_end():
         assert middles[0] - length / 2 == pytest.approx(0.0)
         assert middles[-1] + length / 2 == pytest.approx(height)
         assert np.diff(middles).max() <= length + 1e-12, "no gap"
+    twin, rates = diagram.ToAutoDiffXd(), diagram.EvalTimeDerivatives(root).CopyToVector()
+    given = twin.CreateDefaultContext()
+    given.SetTimeStateAndParametersFrom(root)
+    found = ExtractValue(twin.EvalTimeDerivatives(given).CopyToVector()).ravel()
+    np.testing.assert_allclose(found, rates, rtol=1e-9, atol=1e-9)

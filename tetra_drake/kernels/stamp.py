@@ -68,11 +68,12 @@ def _text(value: Any) -> str | None:
 
 @functools.cache  # many kernels use the same functions
 def _head(function: Any) -> str:
-    """What machine code takes from a function or kernel, without the values that it uses."""
+    """What machine code takes from a function or kernel, such as the module where its names are
+    looked up, without the values that it uses."""
     options = getattr(function, "targetoptions", {})
     function = getattr(function, "py_func", function)
     code = _bytecode(function.__code__, docstring=function.__doc__)
-    return f"{sorted(map(str, options.items()))} {code}\n"
+    return f"{function.__module__} {sorted(map(str, options.items()))} {code}\n"
 
 
 def _bytecode(code: CodeType, *, docstring: str | None = None) -> str:

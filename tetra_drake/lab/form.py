@@ -9,7 +9,7 @@ from scipy.linalg import null_space
 
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.lab.study.statics import TOLERANCE, find_statics
-from tetra_drake.laws.cable import CableLaw, elastic_tension
+from tetra_drake.laws.cable import elastic_tension
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -70,7 +70,7 @@ def form_find(scenario: GivenScenario, prestress: Mapping[str, str]) -> Scenario
 def _check_range(structure: Structure, tensions: Mapping[str, float]) -> None:
     """Refuses tensions (N) of groups that would leave a cable no free length."""
     found = np.array([tensions[group] for group in structure.cable_groups])
-    laws = [CableLaw(**law)._replace(free_length=0.0) for law in structure.cable_laws]
+    laws = [law._replace(free_length=0.0) for law in structure.cable_laws]
     most = np.array([*map(elastic_tension, structure.initial_lengths.tolist(), laws)])
     worst = (found / most).argmax()
     if found[worst] > most[worst]:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from tetra_drake.figures.style import FILE_KINDS, save_figure
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import TextTable, render
+from tetra_drake.formatting import render
 from tetra_drake.scenario.load import SCENARIO
 
 README = "README.md"
@@ -43,39 +43,20 @@ def save_findings(
     return [*csv_files, "summary.json", *(f"{name}.{kind}" for kind in kinds)]
 
 
-def write_page(
-    folder: Path,
-    name: str,
-    *,
-    title: str,
-    about: str,
-    table: TextTable,
-    notes: Sequence[str],
-    unknown: str = "",
-    figure: str,
-    caption: str,
-    second: TextTable,
-    content: str,
-) -> None:
+def write_page(folder: Path, name: str, **shown: object) -> None:
     """Writes the page of a study, as HTML to the file `name` and in Markdown to README.md.
 
     Args:
         folder: the folder, which also has the scenario and the figure.
         name: name of the HTML file.
-        title: heading of the page.
-        about: how the study was made.
-        table: main results.
-        notes: warnings, each one a paragraph.
-        unknown: what an unknown interval means, if there is one.
-        figure: name of the figure's file, without .svg.
-        caption: what the figure shows, for readers who do not see it.
-        second: a further table, below the figure.
-        content: what the scenario's file has, such as "has the fitted values".
+        shown: what the templates show: `title`; `about`, how the study was made; `table`, a
+            TextTable of the main results; `notes`, warnings, each one a paragraph; `unknown`, what
+            an unknown interval means, or ""; `figure`, name of the figure's file without .svg;
+            `caption`, what the figure shows, for readers who do not see it; `second`, a further
+            table, below the figure; `content`, what the scenario's file has.
 
     Raises:
         InputError: if a file cannot be written.
     """
-    shown = {"title": title, "about": about, "table": table, "notes": notes, "unknown": unknown}
-    shown |= {"figure": figure, "caption": caption, "second": second, "content": content}
     for file, template in ((name, "page.html"), (README, "page.md")):
         write_whole(folder / file, render(f"lab/{template}.jinja", **shown, scenario=SCENARIO))

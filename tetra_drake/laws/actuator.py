@@ -320,8 +320,8 @@ class ActuatorKind(Section):
 
 
 class Force(ActuatorKind):
-    """Ideal actuators: the signals are forces that add to the tensions of the cables, without
-    limits (thesis section 2.1.3)."""
+    """Ideal actuators without limits: signals are forces that add to the cables' tensions (thesis
+    section 2.1.3)."""
 
     kind = DIRECT
     lacking = (LIMITS,)
@@ -348,7 +348,7 @@ class LimitedActuator(ActuatorKind):
     max_speed: Speed = Field(gt=0)
     """Speed at which the actuator winds a cable without tension."""
     time_constant: Time = Field(gt=0)
-    """Time constant of the lag with which the actuator follows its command."""
+    """Time constant of the tension behind its command."""
 
     @model_validator(mode="before")
     @classmethod
@@ -379,8 +379,8 @@ class Winch(LimitedActuator):
     command_unit = 1e-3
 
     time_constant: Time = Field(default=0.02, gt=0)
-    """Time constant of the free length behind its command; by default typical of small geared
-    motors (8 Hz)."""
+    """Time constant of the free length behind its command; by default of small geared motors
+    (8 Hz)."""
     least_length: Length = Field(default=0.0, ge=0)
     """Least free length to which the winch winds a cable."""
 

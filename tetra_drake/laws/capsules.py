@@ -294,7 +294,7 @@ class HuntCrossley(Section):
     d of the overlap, with the rate d', is F = k d (1 + c d'); see laws.capsules."""
 
     stiffness: Stiffness = Field(gt=0)
-    """Stiffness k: force divided by depth of the overlap."""
+    """Stiffness k of the overlap."""
     dissipation: InverseSpeed = Field(ge=0)
     """Hunt-Crossley dissipation c, as in Drake. An impact at a low speed v has the restitution 1 -
     2/3 c v."""

@@ -69,7 +69,7 @@ class GroundSection(Section):
     """Stiffness and damping of the ground, which give the normal force (Table 1 of the thesis)."""
 
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
-    """Stiffness of the ground: normal force divided by the depth of a node in the ground."""
+    """Normal force divided by the depth of a node in the ground."""
     damping: Annotated[DampingPerLength, Varied()] = Field(ge=0)
     """Damping of the ground: lambda = 3/2 alpha stiffness. An impact at the speed v has the
     restitution 1 - alpha v (Eq. 2)."""

@@ -229,8 +229,7 @@ class ResetIntegrator(FrictionKind):
     """Where the deflection becomes 0: at the stiction `range`, and the node sticks again at once;
     at `reversal` of the velocity; or `never`."""
     breaks_free: Literal["each", "both"] = "each"
-    """Tangents along which a node breaks free: `each` by itself, or `both` as soon as one
-    deflection reaches the stiction range."""
+    """Tangents along which a node breaks free: `each` by itself, or `both` with the first."""
     load: ForceQuantity | None = Field(default=None, gt=0)
     """Normal force for which the other settings hold, if friction is proportional to it."""
 

@@ -153,9 +153,8 @@ def neuron_outputs(states: Table, outputs: Table, network: Network) -> None:
 
 
 class Matsuoka(CpgKind):
-    """Settings of Matsuoka oscillators (Table 4 of the thesis), pairs of neurons. The parameters of
-    a gait are the weights between oscillators and the time constants; `gait_bounds` has their
-    bounds."""
+    """Matsuoka oscillators (Table 4 of the thesis), pairs of neurons. Parameters of a gait are the
+    weights between oscillators and the time constants, within `gait_bounds`."""
 
     own = OscillatorFunctions(Network, neuron_rates, neuron_outputs)
     mirrors = True

@@ -67,11 +67,11 @@ class GaitBounds(Section):
     weight_min: float = Field(ge=0)
     """Least weight of the inhibition between oscillators."""
     weight_max: float = Field(ge=0)
-    """Greatest weight of the inhibition between oscillators."""
+    """Greatest of these weights."""
     tau_a_min: Time = Field(gt=0)
-    """Least time constant tau_A of the inner state u of an oscillator."""
+    """Least tau_A, the time constant of an oscillator's inner state u."""
     tau_a_max: Time = Field(gt=0)
-    """Greatest time constant tau_A of the inner state u of an oscillator."""
+    """Greatest tau_A."""
     turn: float = Field(default=0.0, ge=-1, le=1)
     """Steering of all random and evolved gaits. Left oscillators get the input u0 (1 + turn), right
     ones u0 (1 - turn)."""
@@ -138,10 +138,10 @@ class CpgKind(Section):
     start_up: Time = Field(default=1.25, ge=0)
     """Time until which the cables are not actuated."""
     signals: Literal["listing", "live"] = "live"
-    """How signals are computed: `listing`, before the simulation by forward Euler, as the thesis's
-    code does; or `live`, integrated with the robot."""
+    """How signals are computed: `listing`, beforehand by forward Euler, as the thesis's code does;
+    or `live`, integrated with the robot."""
     listing_step: Time = Field(default=5e-4, ge=1e-6)
-    """Time step of signals that are computed beforehand."""
+    """Time step of `listing`."""
     feedback: list[Pathway] = Field(default=[])
     """Pathways of feedback; their gains are parameters of the gait."""
 

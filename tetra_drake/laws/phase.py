@@ -78,7 +78,7 @@ def phase_outputs(states: Table, outputs: Table, law: PhaseConstants) -> None:
 
 
 class PhaseOscillators(CpgKind):
-    """Settings of phase oscillators with controlled amplitudes.
+    """Phase oscillators with controlled amplitudes.
 
     Frequency, amplitudes, lags and coupling are parameters of a gait; here are their bounds in
     random gaits, and equal bounds fix them. With fixed amplitudes and coupling and common lags a

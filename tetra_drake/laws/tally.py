@@ -227,7 +227,7 @@ class TalliedMetrics:
     best."""
     actuator_work: float = metric("J", "of all actuators", total("effort.work"), is_cost=True)
     """Work of the actuators in the steady stretch, none recovered: the integral of max(0, -S dl/dt)
-    for driven cables with signal S and length l."""
+    with signals S and lengths l."""
     signal_rate: float = metric(
         "N/s",
         "how fast signals change",
@@ -244,7 +244,7 @@ class TalliedMetrics:
         is_share=True,
     )
     """Share of the steady stretch during which no contact node of a body bears a force, mean over
-    the bodies. In MuJoCo it says little."""
+    bodies. In MuJoCo it says little."""
     clearance: float = metric("m", "smallest gap of struts' axes", total("clearance"), least=True)
     """Least distance, at any time, between strut axes of two bodies. Struts overlap below their
     diameter."""
@@ -270,5 +270,5 @@ class TalliedMetrics:
     actuator_limited: float = greatest(
         "", "time at a limit of an actuator", mean("limited"), is_share=True, needs=LIMITS
     )
-    """Share of the steady stretch during which a limit of an actuator binds, mean over the
+    """Share of the steady stretch during which a limit of an actuator binds, mean over
     actuators."""

@@ -505,9 +505,8 @@ class Rough(Relief):
 class Obstacles(Relief):
     """Round bumps, h = height max(0, 1 - (r / radius)^2) at the distance r from a bump's centre.
 
-    The highest counts. Each square of side `spacing` has one, at a random position; none reaches
-    before `start`. The ground is interpolated smoothly on a grid, so a bump's top is about an
-    eighth lower.
+    The highest counts. Each square of side `spacing` has one, at a random position. The ground is
+    interpolated smoothly on a grid, so a bump's top is about an eighth lower.
     """
 
     place = "over obstacles"
@@ -517,11 +516,11 @@ class Obstacles(Relief):
     radius: Length = Field(gt=0)
     """Radius of a bump."""
     spacing: Length = Field(gt=0)
-    """Side of a square of the ground, which has one bump."""
+    """Side of a square."""
     seed: int = Field(ge=0, default=0)
     """Seed of the random positions."""
     start: Length | None = None
-    """Coordinate x where bumps begin; by default 1 in ahead of the robot."""
+    """Coordinate x before which no bump reaches; by default 1 in ahead of the robot."""
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         cell, spacing = 0.5 * self.radius, self.spacing

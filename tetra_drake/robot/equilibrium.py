@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import math
 import time
@@ -11,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
 from scipy import linalg
-from scipy.sparse import bsr_array, csr_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse import bsr_array
 
 from tetra_drake.errors import InputError
 from tetra_drake.kernels.compiling import LOGGER, compiled
@@ -24,6 +24,7 @@ from tetra_drake.laws.contact import MODE_COLUMNS, NORMAL, Ground, update_modes
 from tetra_drake.laws.forces import Forces, Parts, compute_forces, move_robot
 from tetra_drake.laws.kinematics import FORCE, P_WN, move_bodies, rigid_motions
 from tetra_drake.laws.model import Model
+from tetra_drake.laws.sparse import BLOCK, Schedule, factorise, solve
 from tetra_drake.laws.stiffness import stiffness_matrix
 
 ROUNDING = 64 * np.finfo(float).eps
@@ -51,10 +52,6 @@ HOLD = 30.0
 """Stiffness that is added for a correction (a shift, see _Descent), as a multiple of the greatest
 force over the largest body's radius. This force can have such a stiffness along motions that the
 springs do not resist."""
-
-SPARSE_FROM = 20
-"""Number of bodies from which an envelope is found for the stiffness matrix; finding one takes
-longer than a factorisation of few bodies."""
 
 POWER_STEPS = 10
 """Number of inverse power iterations for the least stable motion of a balanced robot."""
@@ -176,7 +173,7 @@ class _Descent:
         if not np.isfinite(force).all():
             return
         self._stiffness = stiffness_at_rest(self._robot)
-        self.work = Envelope.of(self._stiffness).work
+        self.work = blocks_of(self._stiffness)[0].work
         self._held = _rigid_motions(self._robot, state)
         cables = self._robot.model.cables.law.stiffness  # of slack ones, too
         hardest = max(self._stiffness.diagonal().max(), cables.max(initial=0.0))
@@ -274,7 +271,7 @@ class _Descent:
         return moved, force, step, gain
 
     def _factor(self, stiffness: bsr_array, shift: float) -> Factor | None:
-        """Cholesky's factor of `stiffness` (6*n, 6*n) plus `shift` (N/m) on its diagonal; None if
+        """Factor of `stiffness` (6*n, 6*n) plus `shift` (N/m) on its diagonal; None if
         this sum is not positive definite."""
         return Factor.of(stiffness, shift, least=0.5 * self._least)
 
@@ -287,67 +284,60 @@ class _Descent:
         return step
 
 
-class Envelope(NamedTuple):
-    """Order of the unknowns of a sparse symmetric matrix for factorise(), and the part of its upper
-    half outside which all numbers are 0, also in the factor."""
-
-    order: np.ndarray
-    """Bodies in the order of their unknowns (n,): as they are, or by the reverse algorithm of
-    Cuthill and McKee if this at least halves the work."""
-    ends: np.ndarray
-    """Column behind the last number of each row (6*n,)."""
-
-    @classmethod
-    def of(cls, matrix: bsr_array) -> Envelope:
-        """The envelope of a matrix (6*n, 6*n) with 6 x 6 blocks; the whole upper half if it is
-        small."""
-        bodies = len(matrix.indptr) - 1
-        if bodies < SPARSE_FROM:
-            return cls(np.arange(bodies), np.full(6 * bodies, 6 * bodies))
-        graph = csr_array((np.ones(len(matrix.indices)), matrix.indices, matrix.indptr))
-        by_index = cls._in_order(np.arange(bodies), graph)
-        narrow = cls._in_order(reverse_cuthill_mckee(graph, symmetric_mode=True), graph)
-        return narrow if narrow.work < 0.5 * by_index.work else by_index
-
-    @classmethod
-    def _in_order(cls, order: np.ndarray, graph: csr_array) -> Envelope:
-        row, column = np.argsort(order)[np.array(graph.nonzero())]
-        last = np.zeros(len(order), dtype=np.int64)
-        np.maximum.at(last, row, column)
-        return cls(order, np.repeat(6 * np.maximum.accumulate(last) + 6, 6))
-
-    @property
-    def work(self) -> float:
-        """Work of a factorisation, as for a full matrix whose size cubed is this number."""
-        return 3.0 * float(((self.ends - np.arange(self.ends.size)) ** 2).sum())
-
-
 class Factor(NamedTuple):
-    """Cholesky factor of a sparse symmetric matrix; see factorise()."""
+    """Factor of a sparse symmetric matrix (6*n, 6*n) with 6 x 6 blocks; see laws.sparse."""
 
-    rows: np.ndarray
-    """Rows of the factor, each from its diagonal on (6*n, longest row)."""
-    envelope: Envelope
+    blocks: np.ndarray
+    schedule: Schedule
 
     @classmethod
     def of(cls, matrix: bsr_array, shift: float, *, least: float) -> Factor | None:
-        """The factor of a matrix (6*n, 6*n) with 6 x 6 blocks and `shift` added to its diagonal.
-        None if a pivot is at most `least`."""
-        envelope = Envelope.of(matrix)
-        lengths = envelope.ends - np.arange(envelope.ends.size)
-        factor = np.zeros((lengths.size, lengths.max()))
-        position = np.argsort(envelope.order)
-        put_blocks(matrix.indptr, matrix.indices, matrix.data, position, factor)
-        factor[:, 0] += shift
-        return cls(factor, envelope) if factorise(factor, envelope.ends, least) else None
+        """The factor of a matrix with `shift` added to its diagonal. None if a pivot is at most
+        `least`."""
+        schedule, place = blocks_of(matrix)
+        blocks = np.zeros((len(schedule.later), BLOCK, BLOCK))
+        blocks[place[place >= 0]] = matrix.data[place >= 0]
+        blocks[: schedule.order.size] += shift * np.eye(BLOCK)
+        factorise_blocks(blocks, schedule)
+        inverse_pivots = blocks[: schedule.order.size].diagonal(axis1=1, axis2=2)
+        is_positive = (inverse_pivots > 0.0) & (inverse_pivots * least < 1.0)
+        return cls(blocks, schedule) if is_positive.all() else None
 
     def solved(self, right: np.ndarray) -> np.ndarray:
         """Solution (6*n,) for a right-hand side (6*n,)."""
-        order, x = self.envelope.order, np.empty((right.size // 6, 6))
-        x[order] = solve(
-            self.rows, self.envelope.ends, right.reshape(-1, 6)[order].ravel()
-        ).reshape(-1, 6)
-        return x.ravel()
+        x = right.copy()
+        solve_blocks(self.blocks, self.schedule, x)
+        return x
+
+
+def blocks_of(matrix: bsr_array) -> tuple[Schedule, np.ndarray]:
+    """Schedule for the factorisation of a sparse symmetric matrix, and the index (blocks,) in it of
+    each 6 x 6 block of the matrix; -1 for blocks in the lower half."""
+    return _scheduled(tuple(matrix.indptr.tolist()), tuple(matrix.indices.tolist()))
+
+
+@functools.lru_cache(maxsize=32)
+def _scheduled(first: tuple[int, ...], columns: tuple[int, ...]) -> tuple[Schedule, np.ndarray]:
+    """The result of blocks_of(), for blocks in compressed rows with these columns."""
+    bodies = len(first) - 1
+    rows = np.repeat(np.arange(bodies), np.diff(first)).tolist()
+    pairs = [*zip(rows, columns, strict=True)]
+    schedule = Schedule.of(bodies, [(a, b) for a, b in pairs if a < b])
+    index = schedule.blocks | {(body, body): body for body in range(bodies)}
+    return schedule, np.array([index.get(pair, -1) for pair in pairs])
+
+
+@compiled
+def factorise_blocks(blocks: Table, schedule: Schedule) -> None:
+    """Factorises a matrix in place; see laws.sparse.factorise(). LAPACK is not used because its
+    threads wait for each other on busy processors, and its last digits depend on the processor."""
+    factorise(blocks, schedule)
+
+
+@compiled
+def solve_blocks(blocks: Table, schedule: Schedule, x: Table) -> None:
+    """Solves a system in place that factorise_blocks() has factorised; see laws.sparse.solve()."""
+    solve(blocks, schedule, x)
 
 
 def free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
@@ -422,55 +412,6 @@ def orthonormal(vectors: np.ndarray, least: float) -> np.ndarray:
         basis = np.vstack([basis, unit])
         left -= (left * unit).sum(axis=1)[:, np.newaxis] * unit
     return basis
-
-
-@compiled
-def put_blocks(first: Table, columns: Table, blocks: Table, position: Table, rows: Table) -> None:
-    """Writes the upper half of a matrix to `rows`, as factorise() takes it. The matrix has 6 x 6
-    `blocks` in compressed rows; body i's unknowns move to the position position[i]."""
-    for i in range(position.size):
-        for k in range(first[i], first[i + 1]):
-            for r in range(6):
-                row = 6 * position[i] + r
-                for c in range(6):
-                    column = 6 * position[columns[k]] + c
-                    if column >= row:
-                        rows[row, column - row] = blocks[k, r, c]
-
-
-@compiled
-def factorise(rows: Table, ends: Table, least: float) -> bool:
-    """Replaces the upper half of a symmetric matrix, in place by its Cholesky factor U, with
-    matrix = UᵀU. Returns True if this succeeds. Returns False, with the work half done, if a pivot
-    is at most `least`.
-
-    `rows` (n, longest row) has each row of the matrix from its diagonal on. Row i is 0 from column
-    ends[i] on; see Envelope. LAPACK is not used because its threads wait for each other on busy
-    processors.
-    """
-    for i in range(ends.size):
-        length = ends[i] - i
-        if not rows[i, 0] > least:
-            return False
-        rows[i, :length] /= np.sqrt(rows[i, 0])
-        for k in range(1, length):
-            if rows[i, k] != 0.0:  # mostly 0, as bodies have few neighbours
-                rows[i + k, : length - k] -= rows[i, k] * rows[i, k:length]
-    return True
-
-
-@compiled
-def solve(rows: Table, ends: Table, right: Table) -> Table:
-    """Solution x (n,) of matrix x = right, for a vector `right` (n,). `rows` is what factorise()
-    made of the matrix, with the same `ends` (n,)."""
-    n, x = right.size, right.copy()
-    for i in range(n):
-        x[i] /= rows[i, 0]
-        x[i + 1 : ends[i]] -= rows[i, 1 : ends[i] - i] * x[i]
-    for i in range(n - 1, -1, -1):
-        after = (rows[i, 1 : ends[i] - i] * x[i + 1 : ends[i]]).sum()
-        x[i] = (x[i] - after) / rows[i, 0]
-    return x
 
 
 def force_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:

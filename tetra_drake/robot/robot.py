@@ -113,9 +113,8 @@ class Robot:
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
             for number in self.driven:
-                own = cable.CableLaw(**laws[number])
-                without = own.cut()._replace(free_length=0.0, intact=own.intact)
-                laws[number] = without._asdict()
+                own = laws[number]
+                laws[number] = own.cut()._replace(free_length=0.0, intact=own.intact)
         structure = dataclasses.replace(
             self.structure,
             cable_laws=tuple(laws),

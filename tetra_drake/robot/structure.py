@@ -81,28 +81,21 @@ class Structure(Blueprint):
         """A copy of the structure that stands on an incline as it did on flat ground. The incline
         rises by the angle `slope` (rad) along x, falls if it is negative. All bodies and their
         velocities are rotated about the world's y axis through the origin."""
-        # Written out, because processors round a product of matrices differently.
-        s, c = math.sin(slope), math.cos(slope)
-
-        def turned(vectors: np.ndarray) -> np.ndarray:
-            forward, left, up = vectors.T
-            return np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
-
-        p_WB, v_WB = turned(self.p_WB), self.v_WB
-        if v_WB is not None:
-            v_WB = turned(v_WB.reshape(-1, 3)).reshape(-1, 6)
         s, c = math.sin(slope / 2), math.cos(slope / 2)
+        turn, v_WB = np.array([c, 0.0, -s, 0.0]), self.v_WB
+        if v_WB is not None:
+            v_WB = rotated(turn, v_WB.reshape(-1, 3)).reshape(-1, 6)
+        # Written out, because processors round a product of matrices differently.
         w, x, y, z = self.q_WB.T
         q_WB = np.stack([c * w + s * y, c * x - s * z, c * y - s * w, c * z + s * x], axis=1)
-        return dataclasses.replace(self, p_WB=p_WB, q_WB=q_WB, v_WB=v_WB)
+        return dataclasses.replace(self, p_WB=rotated(turn, self.p_WB), q_WB=q_WB, v_WB=v_WB)
 
     @functools.cached_property
     def cables(self) -> np.ndarray:
         """Cables with their nodes, signals and constants: records (cables,) of
         laws.cable.cable_type(). Their `signal` is the index of the oscillator that drives the
         cable, or laws.cable.PASSIVE without actuator."""
-        laws = [cable.CableLaw(**law) for law in self.cable_laws]
-        cables = cable.CableLaw.put(laws, *self.cable_ends.T)
+        cables = cable.CableLaw.put(self.cable_laws, *self.cable_ends.T)
         for oscillator, driven in enumerate(self.groups):
             cables["signal"][list(driven)] = oscillator
         return cables

@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.laws.model import WORLD, carriers_of
 from tetra_drake.scenario.start import Start
-from tetra_drake.settings.refusals import hint, refuse
+from tetra_drake.settings.refusals import check_known, refuse
 
 TOLERANCE = 1e-6
 """Distance below which two points count as the same, as a share of the robot's size."""
@@ -125,8 +125,8 @@ class Blueprint:
     cable_ends: np.ndarray
     """Indices of the two end nodes of each cable (cables, 2). The node of the body with the lower
     index comes first."""
-    cable_laws: tuple[Mapping[str, Any], ...]
-    """Constants of each cable's force law, by the names of laws.cable.CableLaw."""
+    cable_laws: tuple[CableLaw, ...]
+    """Constants of each cable's force law."""
     slack: bool
     """True if cables go slack instead of pushing."""
     contacts: np.ndarray
@@ -251,11 +251,17 @@ class Blueprint:
         return len(self.oscillators)
 
     @functools.cached_property
+    def _middles(self) -> np.ndarray:
+        """Middles of the cables (cables, 3): means of the middles of their straight pieces."""
+        sums = self.p_WN[self.segments.ends].mean(axis=1).T
+        sums = np.stack([self.along_cables(of_pieces) for of_pieces in sums], axis=1)
+        return sums / np.bincount(self.segments.cable)[:, np.newaxis]
+
+    @functools.cached_property
     def sides(self) -> np.ndarray:
         """Side of each oscillator's cables (oscillators,): 1.0 if the middles of all of them are on
         the left, -1.0 on the right, 0.0 otherwise."""
-        middles, least = self.p_WN[self.segments.ends].mean(axis=1)[:, 1], self._least_distance
-        y = np.bincount(self.segments.cable, middles) / np.bincount(self.segments.cable)
+        y, least = self._middles[:, 1], self._least_distance
         is_left = [(y[list(cables)] > least).all() for cables in self.groups]
         is_right = [(y[list(cables)] < -least).all() for cables in self.groups]
         return np.array(is_left, dtype=float) - np.array(is_right, dtype=float)
@@ -264,12 +270,7 @@ class Blueprint:
     def images(self) -> tuple[int | None, ...]:
         """For each oscillator, the index of the oscillator that drives exactly the mirror images of
         its cables in the plane y = 0, such as itself; None if there is none."""
-        middles = [
-            self.p_WN[self.segments.ends[self.segments.cable == cable]].mean(axis=(0, 1))
-            for cable in range(len(self.cable_ends))
-        ]
-        middle = np.reshape(middles, (-1, 1, 3))
-        paths = np.concatenate([self.p_WN[self.cable_ends], middle], axis=1)
+        paths = np.hstack([self.p_WN[self.cable_ends], self._middles[:, np.newaxis]])
         image_of_cable: list[int] = []
         for mirrored, group in zip(paths * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
             forward = np.abs(paths - mirrored).max(axis=(1, 2))
@@ -288,7 +289,7 @@ class Blueprint:
         """Keys of the cables with friction at their rings, and of the joints with friction."""
         laws = zip(self.cable_keys, self.cable_laws, strict=True)
         joints = itertools.compress(self.joint_keys, self.joint_friction)
-        return [key for key, law in laws if law.get("mu")] + [*joints]
+        return [key for key, law in laws if law.mu] + [*joints]
 
     def check(self) -> None:
         """Raises InputError, naming the key of the robot's settings, if it cannot be simulated."""
@@ -328,8 +329,7 @@ class Blueprint:
                 expected = f"expected none or {bodies}, one for each body"
                 refuse(key, f"found {len(items)} items, {expected}")
         for name in self.start.bodies if self.start else ():
-            if name not in self.bodies:
-                refuse(f"start.bodies.{name}", f"found no such body; {hint(name, self.bodies)}")
+            check_known(f"start.bodies.{name}", "body", name, self.bodies)
 
         lengths, diameters = self._distances(self.struts), 2.0 * self.strut_radius
         masses = math.pi * self.strut_radius**2 * lengths * self.strut_density
@@ -351,7 +351,7 @@ class Blueprint:
         for body, given in self.given_inertia.items():
             mass[body] = mass[body] if given.mass is None else given.mass
         weight = mass.sum() * max(gravity, 9.80665) + np.abs(self.node_load).sum()
-        cables = [HOLDS * law["stiffness"] for law in self.cable_laws]
+        cables = [HOLDS * law.stiffness for law in self.cable_laws]
         firm = max(sum(cables), float(weight) / (SAGS * (self.length or 1.0)))
         return firm, max([STIFFEST * float(mass.min()), *cables])
 
@@ -391,16 +391,14 @@ class Blueprint:
     def _check_places(self) -> None:
         """Raises InputError for two nodes at the same position, unless nothing leads to one of
         them."""
-        p_WN, least = self.p_WN, LEAST_DISTANCE * self.shortest
-        is_end = np.isin(np.arange(len(p_WN)), [*self.segments.ends.flat, *self.struts.flat])
-        for node in np.flatnonzero(is_end)[1:].tolist():
-            distances = np.linalg.norm(p_WN[:node] - p_WN[node], axis=1)
-            distances[self.places[:node] == self.places[node]] = np.inf
-            distances[~is_end[:node]] = np.inf
-            if distances.min() < least:
-                problem = f"found the place of '{self.node_names[distances.argmin()]}'"
-                expected = f"expected nodes {least:.3g} m apart"
-                refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
+        ends = np.unique(np.vstack([self.segments.ends, self.struts]))
+        p_WN, least = self.p_WN[ends], LEAST_DISTANCE * self.shortest
+        is_near = np.linalg.norm(p_WN - p_WN[:, np.newaxis], axis=2) < least
+        is_near &= self.places[ends] != self.places[ends, np.newaxis]
+        for first, second in np.argwhere(is_near):
+            problem = f"found the place of '{self.node_names[ends[first]]}'"
+            expected = f"expected nodes {least:.3g} m apart"
+            refuse(f"nodes.{self.node_names[ends[second]]}", f"{problem}, {expected}")
 
     def _check_cables(self) -> None:
         """Raises InputError for cables that do not join two bodies, or a body and the world; for
@@ -411,7 +409,7 @@ class Blueprint:
             problem = "has length 0 between nodes of a joint, expected nodes at two places"
             refuse(self.cable_keys[self.segments.cable[piece]], problem)
         for cable, key in enumerate(self.cable_keys):
-            first, *others = {*pairs[self.segments.cable == cable].ravel().tolist()}
+            first, *others = self.bodies_at([cable])
             if first == WORLD and not others:
                 refuse(key, "joins two fixed nodes, expected a node of a strut")
             if not others:
@@ -429,8 +427,7 @@ class Blueprint:
             refuse("cables", f"{problem}, expected all bodies to be joined")
 
         lengths = self.along_cables(self._distances(self.segments.ends))
-        for cable, length in enumerate(lengths):
-            law = CableLaw(**self.cable_laws[cable])
+        for cable, (length, law) in enumerate(zip(lengths, self.cable_laws, strict=True)):
             if law.free_length < 0.0:
                 tension = round(elastic_tension(length - law.free_length, law), 12)
                 most = elastic_tension(length, law._replace(free_length=0.0))

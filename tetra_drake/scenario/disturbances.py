@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -79,18 +80,16 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
     """
     tree = scenario.model_dump()
     factors = [(key, x) for joined, x in draw.factors.items() for key in separate(joined)]
-    changed = scenario.with_numbers({key: x * value_at(tree, key) for key, x in factors})
-    robot, terrain = changed.robot, changed.terrain
+    values: dict[str, Any] = {key: x * value_at(tree, key) for key, x in factors}
     if draw.moves is not None:
-        offsets = draw.moves + (robot.offsets or np.zeros_like(draw.moves))
-        robot = robot.model_copy(update={"offsets": offsets.tolist()})
+        offsets = draw.moves + (scenario.robot.offsets or np.zeros_like(draw.moves))
+        values["robot.offsets"] = offsets.tolist()
     if draw.terrain_seed is not None:
-        terrain = terrain.model_copy(update={"seed": draw.terrain_seed})
-    if draw.sensing_seed is not None and changed.sensing is not None:
-        sensing = changed.sensing.model_copy(update={"seed": draw.sensing_seed})
-        changed = changed.with_sections(sensing=sensing)
-    events = [*changed.events, *draw.events]
-    return changed.with_sections(robot=robot, terrain=terrain, events=events, disturbances=None)
+        values["terrain.seed"] = draw.terrain_seed
+    if draw.sensing_seed is not None and scenario.sensing is not None:
+        values["sensing.seed"] = draw.sensing_seed
+    changed = scenario.with_numbers(values)
+    return changed.with_sections(events=[*changed.events, *draw.events], disturbances=None)
 
 
 def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:

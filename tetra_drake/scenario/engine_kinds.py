@@ -28,7 +28,7 @@ class EngineSettings(Section):
 
 
 class Drake(EngineSettings):
-    """Settings of the engine that integrates a Drake diagram with error control.
+    """Integration of a Drake diagram with error control.
 
     The mode of a node is whether it touches the ground, and whether it sticks.
     """
@@ -55,8 +55,7 @@ class Drake(EngineSettings):
 
 
 class Compiled(EngineSettings):
-    """Settings of the compiled engine: a Rosenbrock method in machine code, which simulates many
-    gaits side by side."""
+    """A Rosenbrock method in machine code, which simulates many gaits side by side."""
 
     module: ClassVar[str] = "tetra_drake.engines.lanes.batch"
     tolerance: Speed | None = Field(default=None, gt=0)
@@ -85,7 +84,7 @@ def look_ahead(tolerance: float) -> float:
 
 
 class Mujoco(EngineSettings):
-    """Settings of the engine MuJoCo, with MuJoCo's own contact. Its grounds are planes."""
+    """MuJoCo with its own contact. Its grounds are planes."""
 
     module: ClassVar[str] = "tetra_drake.engines.mujoco"
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)

@@ -10,11 +10,10 @@ from typing import TypeVar
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.laws.cable import CableLaw
 from tetra_drake.scenario.blueprint import Blueprint, cable_numbers
 from tetra_drake.scenario.start import Push
 from tetra_drake.settings.quantities import Keyed, Time
-from tetra_drake.settings.refusals import hint, refuse
+from tetra_drake.settings.refusals import check_known, hint, refuse
 from tetra_drake.settings.section import Section
 
 BlueprintT = TypeVar("BlueprintT", bound=Blueprint)
@@ -49,7 +48,7 @@ def blueprint_after(blueprint: BlueprintT, events: Sequence[Event]) -> Blueprint
     node_mass, payload = blueprint.node_mass.copy(), blueprint.payload.copy()
     for event in events:
         for cable in (numbers[name] for name in event.cut):
-            laws[cable] = CableLaw(**laws[cable]).cut()._asdict()
+            laws[cable] = laws[cable].cut()
         for name in event.lose:
             of_nodes = name in blueprint.node_names
             masses = node_mass if of_nodes else payload
@@ -89,9 +88,7 @@ def check_taken(events: Sequence[Event], blueprint: Blueprint) -> None:
 
 def _check_push(key: str, push: Push, blueprint: Blueprint) -> None:
     nodes, bodies = blueprint.node_names, blueprint.bodies
-    if push.on not in (*bodies, *nodes):
-        advice = hint(push.on, [*bodies, *nodes])
-        refuse(f"{key}.on", f"found '{push.on}', no node or body; {advice}")
+    check_known(f"{key}.on", "node or body", push.on, [*bodies, *nodes])
     held = blueprint.held[nodes.index(push.on)] if push.on in nodes else (False,) * 3
     for axis, is_held, impulse in zip("xyz", held, push.impulse, strict=True):
         if is_held and impulse:

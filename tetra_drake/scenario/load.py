@@ -33,9 +33,7 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
             that it names.
     """
     name = str(name_or_file)
-    file = _file(name, Path())
-    if not os.path.exists(file):
-        raise InputError(name, "", no_such("scenario file", name, shipped_scenarios()))
+    file = _file(name, Path(), name)
     scenario = _load(file)
     scenario.terrain.grid(ahead=0.0, scale=scenario.robot.blueprint().scale, source=file)
     return scenario
@@ -83,9 +81,14 @@ def save_scenario(folder: Path, scenario: Scenario) -> str:
     return text
 
 
-def _file(name: str, folder: Path) -> Path:
-    """The file of a shipped scenario; for another name, the path relative to `folder`."""
-    return SCENARIOS / f"{name}.yaml" if name in shipped_scenarios() else folder / name
+def _file(name: str, folder: Path, source: object, key: str = "") -> Path:
+    """The file of a shipped scenario; for another name, the path relative to `folder`. Raises
+    InputError, naming `source` and `key`, if there is none."""
+    file = SCENARIOS / f"{name}.yaml" if name in shipped_scenarios() else folder / name
+    if not os.path.exists(file):
+        given = f"'{name}': " if key else ""
+        raise InputError(source, key, given + no_such("scenario file", name, shipped_scenarios()))
+    return file
 
 
 def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
@@ -110,8 +113,5 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
         return Scenario.from_tree(with_structure(given, file), file)
     if not isinstance(base, str) or not base:
         raise InputError(file, "base", f"found {base!r}, expected the name of a scenario")
-    base_file = _file(base, file.parent)
-    if not os.path.exists(base_file):
-        problem = no_such("scenario file", base, shipped_scenarios())
-        raise InputError(file, "base", f"'{base}': {problem}")
+    base_file = _file(base, file.parent, file, "base")
     return _load(base_file, (*seen, file.resolve())).with_file(given, file)

@@ -47,6 +47,11 @@ class Poses:
     length: float
     """Length of the robot; see Blueprint.length."""
 
+    @property
+    def x1(self) -> np.ndarray:
+        """Coordinates x (3,) of the first marker."""
+        return self.markers[:, 0, 0]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Walk(Poses):
@@ -103,12 +108,10 @@ _of_poses = functools.partial(metric, of_pose=True)
 class WalkMetrics:
     """Metrics of a walk: distances, turning, cost of transport and travelling index."""
 
-    distance: float = _of_poses(
-        "m", "along x", lambda walk: walk.markers[2, 0, 0] - walk.markers[0, 0, 0]
-    )
+    distance: float = _of_poses("m", "along x", lambda walk: walk.x1[2] - walk.x1[0])
     """Displacement of x₁ along x from the start to the end."""
     steady_distance: float = _of_poses(
-        "m", "without the start", lambda walk: walk.markers[2, 0, 0] - walk.markers[1, 0, 0]
+        "m", "without the start", lambda walk: walk.x1[2] - walk.x1[1]
     )
     """Displacement of x₁ along x from `simulation.steady_from` to the end: Δx₁ of Eq. 10."""
     speed: float = _of_poses("m/s", "of the centre", _mean_speed)
@@ -122,16 +125,13 @@ class WalkMetrics:
     twist: float = _of_poses(
         "m",
         "one rear foot ahead of the other",
-        lambda walk: abs(walk.markers[2, 0, 0] - walk.markers[2, 1, 0]),
+        lambda walk: abs(walk.x1[2] - walk.markers[2, 1, 0]),
         needs=ROW,
         is_cost=True,
     )
     """Distance along x between the rear feet at the end: abs(x₁ - x₂)."""
     lead: float = _of_poses(
-        "m",
-        "front tip ahead of rear foot",
-        lambda walk: walk.tip[2, 0] - walk.markers[2, 0, 0],
-        needs=ROW,
+        "m", "front tip ahead of rear foot", lambda walk: walk.tip[2, 0] - walk.x1[2], needs=ROW
     )
     """Distance along x from the rear foot to the front tip at the end: x₃ - x₁."""
     lateral_drift: float = _of_poses(

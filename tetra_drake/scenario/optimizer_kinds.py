@@ -2,12 +2,11 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field
 
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.settings.plugins import OPTIMIZERS
 from tetra_drake.settings.quantities import TWO, Time, by_name
-from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Kinds, Section
 
 MOST_GAITS = 100_000
@@ -30,12 +29,12 @@ class OptimizerSettings(Section):
 
 
 class SteadyState(OptimizerSettings):
-    """Settings of the thesis's evolutionary algorithm (its Table 6, section 2.3, appendix A)."""
+    """The thesis's evolutionary algorithm (its Table 6, section 2.3, appendix A)."""
 
     population: int = Field(default=50, ge=2, le=MOST_GAITS)
     """Number of gaits in the population."""
     tournament: int = Field(default=5, ge=1, le=MOST_GAITS)
-    """Number of gaits drawn to select a parent, or the gait that a child replaces."""
+    """Number of gaits drawn for a parent, or for the gait that a child replaces."""
     crossover_probability: float = Field(default=0.2, ge=0, le=1)
     """Probability that two children swap a parameter."""
     mutation_probability: float = Field(default=0.7, ge=0, le=1)
@@ -43,7 +42,7 @@ class SteadyState(OptimizerSettings):
     weight_mutation: float = Field(default=0.2, ge=0)
     """Largest change of a weight in one mutation."""
     tau_mutation: Literal["intended", "listing"] = "intended"
-    """Whether mutation changes tau_A, or never does, like the thesis's `listing` A.3.4."""
+    """Whether mutation changes tau_A, or never does, as in the thesis's `listing` A.3.4."""
     tau_mutation_range: Time = Field(default=0.05, ge=0)
     """Largest change of tau_A in one mutation."""
     stop_rise: float = Field(default=0.03, ge=0)
@@ -55,7 +54,7 @@ class SteadyState(OptimizerSettings):
 
 
 class CmaEs(OptimizerSettings):
-    """Settings of covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
+    """Covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
 
     Gaits are drawn from a normal distribution that adapts to the fittest. A search that has
     converged restarts around its best gait, with twice the population; one that has stalled begins
@@ -63,7 +62,7 @@ class CmaEs(OptimizerSettings):
     """
 
     population: int | None = Field(default=None, ge=4, le=MOST_GAITS)
-    """Number of vectors in an iteration; by default 4 + 3 ln n, rounded down, for n parameters."""
+    """Number of vectors in an iteration; by default 4 + 3 ln n, rounded down."""
     sample: int = Field(default=40, ge=0, le=MOST_GAITS)
     """Number of random gaits that are evaluated before each search."""
     starts: int = Field(default=5, ge=1, le=1000)
@@ -73,14 +72,21 @@ class CmaEs(OptimizerSettings):
 
 
 class RandomSearch(OptimizerSettings):
-    """Random search, a baseline for other optimisers: all gaits are random. It has no settings."""
+    """Baseline for other optimisers: all gaits are random."""
+
+
+def _checked_range(ends: list[float]) -> list[float]:
+    low, high = ends
+    if low >= high:
+        raise ValueError(f"found {low}, expected less than the range's end, {high}")
+    return ends
 
 
 CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
 class QualityDiversity(OptimizerSettings):
-    """Settings of a search for a map of two metrics with the fittest gait in each cell.
+    """Search for a map of two metrics with the fittest gait in each cell.
 
     By CMA-MAE of pyribs (extra `qd`; Fontaine and Nikolaidis, arXiv 2205.10752): a cell's level of
     fitness slowly follows its fittest gait, and several runs of CMA-ES look for gaits above the
@@ -93,23 +99,15 @@ class QualityDiversity(OptimizerSettings):
 
     measures: Annotated[
         dict[str, list[float]],
-        *by_name(UNITS, lambda x: Annotated[list[x], TWO]),
-    ] = Field(default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]})
+        *by_name(UNITS, lambda x: Annotated[list[x], TWO, AfterValidator(_checked_range)]),
+    ] = Field(
+        default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}, min_length=2, max_length=2
+    )
     """Two metrics with their ranges on the map; cells at the edge also have what is outside."""
     cells: list[CellCount] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)
     """Number of draws of disturbances; each gait of the map is simulated in all at the end."""
-
-    @model_validator(mode="after")
-    def _check(self) -> "QualityDiversity":
-        if len(self.measures) != 2:
-            refuse("measures", f"found {len(self.measures)} metrics, expected two")
-        for name, (low, high) in self.measures.items():
-            if low >= high:
-                problem = f"found {low}, expected less than the range's end, {high}"
-                refuse(f"measures.{name}", problem)
-        return self
 
 
 OptimizerKind = Annotated[

@@ -29,12 +29,12 @@ Reading = Literal[
 
 
 class RollingPolicy(PolicyKind):
-    """Policy that rolls a robot: each cable is shortened by the same polynomial of its place.
+    """Policy that rolls a robot: each cable is shortened by the same polynomial of x and z.
 
-    The place is x and z of the cable's middle from the robot's centre, in the world frame, in units
-    of half the first strut. So the robot keeps its shape in the world while it rolls through it; a
-    clock keeps it from coming to rest. The parameters are the coefficients of 1, x, z, x², xz, z²,
-    sx and sz, where s is the sine of the clock.
+    They are the place of its middle from the robot's centre, in the world frame, in units of half
+    the first strut. So the robot keeps its shape in the world while it rolls through it; a clock
+    keeps it from coming to rest. The parameters are the coefficients of 1, x, z, x², xz, z², sx and
+    sz, where s is the sine of the clock.
     """
 
     tag = "Rolling"

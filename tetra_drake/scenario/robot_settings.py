@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+import operator
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import pydantic
+from pydantic import Field
 
 from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.tolerances import split_tolerances
+from tetra_drake.scenario.start import Start
+from tetra_drake.scenario.tolerances import Tolerances, split_tolerances
+from tetra_drake.settings.quantities import Acceleration, Position
 from tetra_drake.settings.section import Kinds, Section, Tree
 
 ROW = "row of tetrahedra"
@@ -15,22 +19,25 @@ ROW = "row of tetrahedra"
 
 
 class RobotSettings(Section):
-    """Base class for the settings of a robot.
-
-    All kinds have the settings `gravity`, `offsets` (one for each body), `start` and `tolerances`,
-    and `unit`, which is the unit of bare coordinates in a file, or None.
-    """
+    """Base class for the settings of a robot. All kinds also have `unit`, which is the unit of bare
+    coordinates in a file, or None."""
 
     lacking: ClassVar[tuple[str, ...]] = (ROW,)
     """Properties that some metrics need and this robot does not have; see scenario.metrics."""
-    if TYPE_CHECKING:  # fields of the kinds, each at its place in a file
-        gravity: Any
-        offsets: Any
-        start: Any
-        tolerances: Any
+    if TYPE_CHECKING:
 
         @property
         def unit(self) -> str | None: ...
+
+    gravity: Acceleration = Field(default=9.80665, ge=0)
+    """Acceleration of gravity."""
+    offsets: list[Position] = Field(default=[])
+    """Displacement [x, y, z] of each body at t = 0, but for the axes of its anchors."""
+    start: Start | None = Field(default=None, exclude_if=operator.not_)
+    """How the robot is turned and moves at t = 0; at rest if there is none."""
+    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
+    """Tolerances of numbers of the robot by key: `cables.side.stiffness: 2 %`, `nodes: 1 mm`; also
+    in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
 
     _split = pydantic.model_validator(mode="before")(split_tolerances)
 

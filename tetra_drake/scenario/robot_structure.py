@@ -20,29 +20,23 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from tetra_drake.laws.cable import (
-    CableLaw,
-    Curve,
-    elastic_stretch,
-    elastic_tension,
-)
+from tetra_drake.laws.cable import CableLaw, Curve, elastic_stretch, elastic_tension
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia, cable_numbers
 from tetra_drake.scenario.robot_settings import RobotSettings
-from tetra_drake.scenario.start import Start
 from tetra_drake.scenario.structure_graph import (
     Member,
     Pair,
     components,
     members,
+    nodes_of,
     struts_by_name,
-    with_joints,
+    unused_name,
 )
-from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
+from tetra_drake.scenario.tolerances import check_tolerances
 from tetra_drake.settings.plugins import origin
 from tetra_drake.settings.quantities import (
     THREE,
-    Acceleration,
     Damping,
     Density,
     ForceQuantity,
@@ -50,13 +44,12 @@ from tetra_drake.settings.quantities import (
     Keyed,
     Length,
     Mass,
-    Position,
     Stiffness,
     Time,
     Torque,
     quantity,
 )
-from tetra_drake.settings.refusals import described, hint, refuse
+from tetra_drake.settings.refusals import check_known, described, refuse
 from tetra_drake.settings.section import (
     Section,
     Varied,
@@ -121,9 +114,9 @@ class StrutGroup(Section):
     sphere's, else the strut's; 0 where an anchor holds along z."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
     """Axial force per shortening, E A / l; none for rigid struts. Without load a strut is as long
-    as in the file. Its stiffness counts in equilibrium and in natural frequencies, the inertia of
-    its elongation does not: the first two frequencies are 0.75 % too high at most if it is 17 times
-    as stiff as its cable, 12 % if as stiff. In motion it keeps its length."""
+    as in the file. It counts at rest and in frequencies, without the inertia of elongation: the
+    first two frequencies are at most 0.75 % too high if it is 17 times as stiff as its cable, 12 %
+    if as stiff. In motion a strut is rigid."""
 
 
 class SphereGroup(Section):
@@ -137,8 +130,7 @@ class SphereGroup(Section):
     density: Density = Field(ge=0)
     """Density of a sphere; 0 only where other parts of the body have mass."""
     contact_radius: Length | None = Field(default=None, ge=0)
-    """Radius with which a sphere touches the ground. By default its own; 0 where an anchor holds
-    along z."""
+    """Radius that touches the ground; by default its own, or 0 where an anchor holds along z."""
 
 
 class CurveTable(Section):
@@ -164,22 +156,22 @@ class CableGroup(Section):
     """Cables, springs or strings with the same constants. They never push."""
 
     damping: Damping | None = Field(default=None, ge=0)
-    """Damping coefficient of a cable: tension divided by the rate of its length. For a string the
-    default is 1 ms times its stiffness."""
+    """Damping of a cable: tension per rate of its length. For a string the default is 1 ms times
+    its stiffness."""
     pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
     """The nodes of each cable. [a, b, c] runs over a ring at b."""
     mu: float = Field(default=0.0, ge=0, le=2, exclude_if=operator.not_)
     """Coefficient of friction at rings: over an angle theta, tensions have the ratio exp(mu theta)
-    in slip. Then the law's tension, which is shown, is the mean along the cable. What friction
-    holds creeps, with up to about 1 mm/s. A winch is at the last node of its path."""
+    in slip. The tension that is shown is the mean along the cable. What friction holds creeps, up
+    to about 1 mm/s. A winch is at the path's last node."""
     stiffness: Annotated[Stiffness | None, Varied()] = Field(default=None, gt=0)
     """Tension per elongation. Only a string or a curve needs none."""
     string: bool = Field(default=False, exclude_if=operator.not_)
     """True for strings, which hardly stretch. Without a stiffness they get the default of
     `anchor_stiffness`."""
     initial_tension: ForceQuantity = Field(default=0.0, ge=0, exclude_if=operator.not_)
-    """Tension F0 of a coil spring from which on its coils part: T = F0 + k x. Below it, they are
-    1000 times as stiff."""
+    """Tension F0 from which on the coils of a spring part: T = F0 + k x. Below, they are 1000 times
+    as stiff."""
     quadratic: Annotated[float, *quantity("N/m^2")] = Field(
         default=0.0, ge=0, exclude_if=operator.not_
     )
@@ -224,28 +216,25 @@ class CableGroup(Section):
                 refuse(f"factors.{name}", f"{found}, expected {len(self.pairs)} of a given number")
         return self
 
-    def law(self, distance: float, place: int, *, firm: float = 0.0) -> dict[str, Any]:
-        """Constants (SI) of a cable's force law, by the names of laws.cable.CableLaw. `distance`
-        (m) is the distance of its nodes in the file; it gives the free length for a `tension`.
-        `place` is the cable's index in `pairs`, `firm` (N/m) the stiffness of strings that give
-        none."""
+    def law(self, distance: float, place: int, *, firm: float) -> CableLaw:
+        """Constants (SI) of a cable's force law. `distance` (m) is the distance of its nodes in the
+        file; it gives the free length for a `tension`. `place` is the cable's index in `pairs`,
+        `firm` (N/m) the stiffness of strings that give none."""
         own: dict[str, float] = {
             name: values[place] * getattr(self, name) for name, values in self.factors.items()
         }
         group = self.model_copy(update=own) if own else self
-        stiffness, damping, free_length = group.stiffness or firm, group.damping, group.free_length
+        stiffness = group.stiffness or firm
         table = [*zip(self.curve.stretch, self.curve.force, strict=True)] if self.curve else []
         if table:
             stiffness = table[-1][1] / table[-1][0]
         more = {name: getattr(self, name) for name in ("initial_tension", "quadratic", "cubic")}
         curve = Curve.of_spring(stiffness, table=table, **more)
-        law: dict[str, Any] = {"damping": STRING_TIME * stiffness if damping is None else damping}
-        law |= {"stiffness": stiffness} | ({"curve": curve} if curve.pieces else {})
-        law |= {"mu": self.mu} if self.mu else {}
-        if free_length is None:
-            own_law = CableLaw(**law, free_length=distance)
-            free_length = distance - elastic_stretch(group.tension or 0.0, own_law)
-        return law | {"free_length": free_length}
+        damping = STRING_TIME * stiffness if group.damping is None else group.damping
+        law = CableLaw(stiffness, damping, group.free_length or 0.0, mu=self.mu, curve=curve)
+        if group.tension is None:
+            return law
+        return law._replace(free_length=distance - elastic_stretch(group.tension, law))
 
 
 class BallJoint(Section):
@@ -270,7 +259,7 @@ class JoinedBody(Section):
     nodes: list[str] = Field(default=[])
     """Further nodes of the body, which need no strut."""
     mass: Mass | None = Field(default=None, gt=0)
-    """Mass of the whole body, in place of the masses of its parts."""
+    """Mass of the whole body, in place of its parts'."""
     centre: Coordinates | None = None
     """Centre of mass [x, y, z] where the nodes are as in the file."""
     inertia: Annotated[list[InertiaQuantity], Field(min_length=3, max_length=6)] | None = None
@@ -323,7 +312,7 @@ class StructureFile(RobotSettings):
     """Nodes at which ball joints hold struts together; elsewhere struts that share a node are one
     body. Each body but the first gets a copy, n-2, and a joint of this name."""
     joint_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness of pinned nodes, and of joints that give none; by default as for anchors."""
+    """Stiffness of pinned nodes and of joints without one; by default as for anchors."""
     bodies: Keyed[Name, JoinedBody] = Field(default={})
     actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Cables of each oscillator, such as side a b, nodes in either order."""
@@ -336,23 +325,13 @@ class StructureFile(RobotSettings):
     """Axes along which the world holds nodes, such as xyz; nodes of struts by a spring and a
     damper."""
     anchor_stiffness: Stiffness | None = Field(default=None, gt=0, exclude_if=operator.not_)
-    """Stiffness of the anchor of a strut's node, along each axis. By default it follows from cables
-    and weight: see FORMAT.md."""
+    """Stiffness of anchors along each axis; by default from cables and weight, see FORMAT.md."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
     """Ratio of damping to stiffness of an anchor; as for joints."""
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
-    gravity: Acceleration = Field(default=9.80665, ge=0)
-    """Acceleration of gravity."""
-    offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0, but for the axes of its anchors."""
-    start: Start | None = Field(default=None, exclude_if=operator.not_)
-    """How the robot is turned and moves at t = 0; at rest if there is none."""
     ignored: list[str] | None = None
     """Settings of an imported file that have no effect, such as friction."""
-    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key: `cables.side.stiffness: 2 %`, `nodes: 1 mm`; also
-    in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.
@@ -361,6 +340,15 @@ class StructureFile(RobotSettings):
         struts, and other nodes with a mass or a sphere. Cables are in the order of the pairs of
         bodies, those from fixed nodes first. Cables that run over rings come after all others.
         """
+        blueprint = self._blueprint(firm=0.0)
+        is_firm = any(group.string and not group.stiffness for group in self.cables.values())
+        if not (self.joints or self.anchors or is_firm):
+            return blueprint
+        return self._blueprint(firm=min(blueprint.firm_stiffness(self.gravity)))
+
+    def _blueprint(self, *, firm: float) -> Blueprint:
+        """The blueprint, with the stiffness `firm` (N/m) of anchors, joints and strings that give
+        none."""
         bodies, joined = self._nodes_of_bodies(), self._nodes_of_joined()
         first_node = np.append(0, np.cumsum([len(nodes) for nodes in bodies]))
         body_of = {node: body for body, nodes in enumerate(bodies) for node in nodes}
@@ -374,10 +362,10 @@ class StructureFile(RobotSettings):
         struts = sorted(members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
         makes = [self.struts[strut.group] for strut in struts]
         ends = [[number[node] for node in strut.nodes] for strut in struts]
-        cables = self._cables_of(number, body_of)
+        cables, anchors = self._cables_of(number, body_of, firm), self.anchor_stiffness or firm
         numbers = cable_numbers(cables["cable_names"])
 
-        blueprint = Blueprint(
+        return Blueprint(
             bodies=self._names_of_bodies(bodies, nodes),
             node_names=nodes,
             first_node=first_node,
@@ -391,13 +379,13 @@ class StructureFile(RobotSettings):
             **self._spheres(number, held),
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
-            anchor_stiffness=held.astype(float),  # per stiffness, as joints
-            anchor_damping=self.anchor_time_constant * held,
+            anchor_stiffness=anchors * held,
+            anchor_damping=anchors * (self.anchor_time_constant * held),
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
             start=self.start,
             **cables,
-            **self._joints_of(number, body_of),
+            **self._joints_of(number, body_of, firm),
             given_inertia={
                 body_of[joined[key][0]]: body.given for key, body in self.bodies.items()
             },
@@ -409,23 +397,9 @@ class StructureFile(RobotSettings):
                 for names in self.actuated.values()
             ),
         )
-        is_firm = any(group.string and not group.stiffness for group in self.cables.values())
-        if not (self.joints or held.any() or is_firm):
-            return blueprint
-        firm = min(blueprint.firm_stiffness(self.gravity))
-        anchors, of_joints = self.anchor_stiffness or firm, self.joint_stiffness or firm
-        joints = np.array([joint.stiffness or of_joints for joint in self.joints.values()])
-        return dataclasses.replace(
-            blueprint,
-            **self._cables_of(number, body_of, firm=firm),
-            anchor_stiffness=anchors * blueprint.anchor_stiffness,
-            anchor_damping=anchors * blueprint.anchor_damping,
-            joint_stiffness=joints,
-            joint_damping=joints * blueprint.joint_damping,
-        )
 
     def _cables_of(
-        self, number: Mapping[str, int], body_of: Mapping[str, int], *, firm: float = 0.0
+        self, number: Mapping[str, int], body_of: Mapping[str, int], firm: float
     ) -> dict[str, Any]:
         """Fields of the blueprint for the cables, each from the body with the lower index. Cables
         within a body of `bodies` are left out. `number` and `body_of` have the index of each node
@@ -448,7 +422,7 @@ class StructureFile(RobotSettings):
             laws.append(group.law(length, int(place_in_group), firm=firm))
             limits.append(group.max_tension or math.inf)
             if group.max_stretch:
-                most = elastic_tension(group.max_stretch, CableLaw(**laws[-1]))
+                most = elastic_tension(group.max_stretch, laws[-1])
                 limits[-1] = min(limits[-1], most)
             paths.append([number[node] for node in path])
         ends = [[path[0], path[-1]] for path in paths]
@@ -462,16 +436,21 @@ class StructureFile(RobotSettings):
             "cable_rings": {i: tuple(path[1:-1]) for i, path in enumerate(paths) if len(path) > 2},
         }
 
-    def _joints_of(self, number: Mapping[str, int], body_of: Mapping[str, int]) -> dict[str, Any]:
+    def _joints_of(
+        self, number: Mapping[str, int], body_of: Mapping[str, int], firm: float
+    ) -> dict[str, Any]:
         """Fields of the blueprint for the joints, each from the body with the lower index. `number`
-        and `body_of` have the index of each node and of its body."""
-        joints = self.joints.values()
+        and `body_of` have the index of each node and of its body. `firm` (N/m) is the stiffness of
+        joints that give none."""
+        joints, usual = self.joints.values(), self.joint_stiffness or firm
+        stiffness = np.array([joint.stiffness or usual for joint in joints])
         ends = [sorted(joint.nodes, key=body_of.__getitem__) for joint in joints]
         pairs = [[number[first], number[second]] for first, second in ends]
         return {
             "joints": np.array(pairs, dtype=int).reshape(-1, 2),
             "joint_keys": tuple(f"joints.{name}" for name in self.joints),
-            "joint_damping": np.array([joint.time_constant for joint in joints]),
+            "joint_stiffness": stiffness,
+            "joint_damping": stiffness * [joint.time_constant for joint in joints],
             "joint_friction": np.array([joint.friction for joint in joints]),
         }
 
@@ -537,16 +516,13 @@ class StructureFile(RobotSettings):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _prepare(cls, tree: Any) -> Any:
-        """Checks the content of a structure file before its fields are read, and completes it.
+        """Checks the unit of a structure file before its fields are read, and completes them.
 
-        Replaces `pinned` by joints. Nodes get the unit of the key `unit` where their coordinates
-        are bare numbers. Afterwards `unit` is "mm" or None: a robot in mm is shown in mm, for
-        others Scenario.units chooses the unit by size.
+        Nodes get the unit of the key `unit` where their coordinates are bare numbers. Afterwards
+        `unit` is "mm" or None: a robot in mm is shown in mm, for others Scenario.units chooses the
+        unit by size.
         """
-        if not isinstance(tree, dict):
-            return tree
-        tree = with_joints(tree) if tree.get("pinned") else tree
-        unit = tree.get("unit")
+        unit = tree.get("unit") if isinstance(tree, dict) else None
         if unit is None:
             return tree
         try:
@@ -566,10 +542,58 @@ class StructureFile(RobotSettings):
                 section[key] = mapped(section[key], with_unit)
         return tree
 
+    def _replace_pinned(self) -> None:
+        """Puts joints in place of the pinned nodes, in this structure itself.
+
+        Struts that share a pinned node are one body there only if they also share another node, or
+        if `bodies` joins them. The body of the first strut at the node keeps it. Each other one
+        gets a copy of it, named "l-2", "l-3" and so on for the node l, and a joint with the name of
+        the copy. Refuses a pinned node that no two bodies share.
+        """
+        struts = [*members("struts", self.struts)]
+        named, index = struts_by_name(struts), {strut.key: i for i, strut in enumerate(struts)}
+        parts = [pair for group in self.struts.values() for pair in group.pairs]
+        parts += [body.nodes for body in self.bodies.values()]
+        welded: list[list[str | int]] = [
+            [part, *(node for node in nodes if node not in self.pinned)]
+            for part, nodes in enumerate(parts)
+        ]
+        for own, body in zip(welded[len(struts) :], self.bodies.values(), strict=True):
+            own += [index[strut.key] for name in body.struts for strut in named.get(name, ())]
+        body_of = {part: i for i, body in enumerate(components(welded)) for part in body}
+
+        for place, node in enumerate(self.pinned):
+            check_known(f"pinned[{place}]", "node", node, self.nodes)
+            here: dict[int, list[list[str]]] = {}
+            for part, nodes in enumerate(parts):
+                if node in nodes:
+                    here.setdefault(body_of[part], []).append(nodes)
+            if len(here) < 2:
+                expected = "expected a node that struts of two bodies share"
+                refuse(f"pinned[{place}]", f"found '{node}', {expected}")
+            for of_body in [*here.values()][1:]:
+                copy = unused_name(node, self.nodes | self.joints)
+                self.nodes[copy], self.joints[copy] = (
+                    self.nodes[node],
+                    BallJoint(nodes=[node, copy]),
+                )
+                for nodes in of_body:
+                    nodes[:] = [copy if one == node else one for one in nodes]
+
+        renamed = dict[str, str]()
+        for old, new in zip(struts, members("struts", self.struts), strict=True):
+            renamed |= dict.fromkeys(old.names, new.names[0])
+        for body in self.bodies.values():
+            body.struts[:] = [renamed.get(name, name) for name in body.struts]
+        self.pinned.clear()
+
     @pydantic.model_validator(mode="after")
     def _check(self) -> StructureFile:
-        """Refuses unknown names, members that are there twice, nodes that hang on nothing, and two
-        entries for one body. Then checks what holds for any robot, see Blueprint.check()."""
+        """Replaces `pinned` by joints. Refuses unknown names, members that are there twice, nodes
+        that hang on nothing, and two entries for one body. Then checks what holds for any robot,
+        see Blueprint.check()."""
+        if self.pinned:
+            self._replace_pinned()
         self._check_names()
         self._check_members()
         self._check_nodes()
@@ -587,19 +611,13 @@ class StructureFile(RobotSettings):
         """Refuses nodes and struts that do not exist."""
         named = [(member.key, node) for member in self._members for node in member.nodes]
         named += [(f"anchors.{node}", node) for node in self.anchors]
-        for kind, entries in (("joints", self.joints), ("bodies", self.bodies)):
-            for name, entry in entries.items():
-                nodes = enumerate(entry.nodes)
-                named += [(f"{kind}.{name}.nodes[{i}]", node) for i, node in nodes]
+        named += [*nodes_of("joints", self.joints), *nodes_of("bodies", self.bodies)]
         for key, node in (*named, *self._named_as_moving):
-            if node not in self.nodes:
-                refuse(key, f"found unknown node '{node}'; {hint(node, self.nodes)}")
+            check_known(key, "node", node, self.nodes)
         struts = struts_by_name(members("struts", self.struts))
         for name, body in self.bodies.items():
             for i, strut in enumerate(body.struts):
-                if strut not in struts:
-                    found = f"found unknown strut '{strut}'; {hint(strut, struts)}"
-                    refuse(f"bodies.{name}.struts[{i}]", found)
+                check_known(f"bodies.{name}.struts[{i}]", "strut", strut, struts)
 
     @property
     def _members(self) -> list[Member]:
@@ -609,8 +627,7 @@ class StructureFile(RobotSettings):
     def _named_as_moving(self) -> list[tuple[str, str]]:
         """Keys and names of the nodes that only a body can have."""
         moving = [(f"masses.{node}", node) for node in self.masses]
-        for name, group in self.spheres.items():
-            moving += [(f"spheres.{name}.nodes[{i}]", node) for i, node in enumerate(group.nodes)]
+        moving += nodes_of("spheres", self.spheres)
         moving += [(f"loads.{node}", node) for node in self.loads]
         if self.contacts != "all":
             moving += [(f"contacts[{i}]", node) for i, node in enumerate(self.contacts)]
@@ -671,8 +688,7 @@ class StructureFile(RobotSettings):
         for oscillator, names in self.actuated.items():
             for i, name in enumerate(names):
                 key = f"actuated.{oscillator}[{i}]"
-                if name not in numbers:
-                    refuse(key, f"found unknown cable '{name}'; {hint(name, numbers)}")
+                check_known(key, "cable", name, numbers)
                 cable = numbers[name]
                 if cable in drivers:
                     found = f"found '{cable_names[cable]}', which '{drivers[cable]}' drives"
@@ -685,15 +701,6 @@ class ParametricRobot(RobotSettings):
     made."""
 
     unit: ClassVar[None] = None
-
-    gravity: Acceleration = Field(default=9.80665, ge=0)
-    """Acceleration of gravity."""
-    offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0; none if empty."""
-    start: Start | None = Field(default=None, exclude_if=operator.not_)
-    """How the robot is turned and moves at t = 0; at rest if there is none."""
-    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key."""
 
     def structure(self) -> StructureFile:
         """The structure for these settings. Its gravity and tolerances are not used."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import operator
 from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
@@ -13,15 +12,12 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.robot_settings import RobotSettings
-from tetra_drake.scenario.start import Start
-from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
+from tetra_drake.scenario.tolerances import check_tolerances
 from tetra_drake.settings.quantities import (
-    Acceleration,
     Damping,
     Density,
     Length,
     Mass,
-    Position,
     Stiffness,
     quantity,
 )
@@ -64,7 +60,7 @@ class RowCables(Section):
     """The cables of a row of tetrahedra (Table 3 of the thesis)."""
 
     damping: Damping = Field(ge=0)
-    """Damping coefficient of a cable: tension divided by the rate of its length."""
+    """Damping of a cable: tension per rate of its length."""
 
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of outer cables, which join base nodes of one name."""
@@ -73,14 +69,12 @@ class RowCables(Section):
     free_length: Length = Field(ge=0)
     """Length without tension."""
     slack: bool
-    """True if a cable pulls only while it is stretched; otherwise it also pushes (Eq. 6)."""
+    """True if cables go slack; otherwise they also push (Eq. 6)."""
 
-    def law(self, cable: str) -> dict[str, float]:
-        """Constants (SI) of the force law of one cable of a junction, such as "outer top", by the
-        names of laws.cable.CableLaw."""
+    def law(self, cable: str) -> CableLaw:
+        """Constants (SI) of the force law of one cable of a junction, such as "outer top"."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
-        free_length, damping = self.free_length, self.damping
-        return {"stiffness": stiffness, "damping": damping, "free_length": free_length}
+        return CableLaw(stiffness, self.damping, self.free_length)
 
 
 Spacing = Annotated[float, *quantity("m", balanced=0.0)]
@@ -107,23 +101,15 @@ class Tetrahedra(RobotSettings):
     spacing: Annotated[Spacing, Varied()] = Field(ge=0)
     """Distance between base triangles at t = 0. `balanced` (or 0): where the cables balance; also
     where a file changes its base's strut length, or cables' stiffness or free length."""
-    gravity: Acceleration = Field(ge=0)
-    """Acceleration of gravity."""
-    offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each tetrahedron at t = 0."""
-    start: Start | None = Field(default=None, exclude_if=operator.not_)
-    """How the robot is turned and moves at t = 0; at rest if there is none."""
     payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
     """Point mass at the centre of each tetrahedron, such as its motors."""
     contacts: Literal["thesis", "all"] = "thesis"
-    """Nodes that the ground can touch. `thesis`: the bottom nodes and the foremost tip, which reach
-    flat ground. `all`: all four of every tetrahedron."""
+    """Nodes that the ground can touch: `thesis`, the bottom nodes and the foremost tip, or
+    `all`."""
     actuation: list[Annotated[list[CableName], Field(min_length=1)]] = Field(
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )
     """Groups of a junction's cables that share an oscillator."""
-    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
-    """Tolerances of numbers of the robot by key, such as `cables.outer_stiffness: 2 %`."""
 
     _check_known = model_validator(mode="after")(check_tolerances)
 
@@ -201,7 +187,7 @@ class Tetrahedra(RobotSettings):
         deciding = []  # strut length, and all constants of cables at rest
         for robot in (self, base):
             laws = [robot.cables.law(cable) for cable in ("outer top", "inner top")]
-            deciding.append([robot.strut_length, *(law | {"damping": 0.0} for law in laws)])
+            deciding.append([robot.strut_length, *(law._replace(damping=0.0) for law in laws)])
         return {"spacing": "balanced"} if deciding[0] != deciding[1] else {}
 
     @field_validator("spacing")
@@ -219,7 +205,7 @@ class Tetrahedra(RobotSettings):
             return spacing
         strut_length, cables = info.data["strut_length"], info.data["cables"]
         height, radius = strut_length * math.sqrt(2.0 / 3.0), strut_length / math.sqrt(3.0)
-        outer, inner = CableLaw(**cables.law("outer top")), CableLaw(**cables.law("inner top"))
+        outer, inner = cables.law("outer top"), cables.law("inner top")
 
         def pull(s: float) -> float:
             length = math.hypot(radius, height - s)

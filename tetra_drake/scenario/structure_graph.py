@@ -1,16 +1,12 @@
-"""Graphs of structure files: struts and cables, the bodies that struts make, and pinned nodes."""
+"""Graphs of structure files: struts and cables, and the bodies that struts make."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
-from typing import Annotated, Any, NamedTuple, Protocol, TypeVar
+from typing import Annotated, NamedTuple, Protocol, TypeVar
 
-from pydantic import BaseModel, ValidationError
-
-from tetra_drake.settings.quantities import TWO, Keyed
-from tetra_drake.settings.refusals import hint, refuse
-from tetra_drake.settings.section import Tree, tree_value
+from tetra_drake.settings.quantities import TWO
 
 NodeT = TypeVar("NodeT", bound=Hashable)
 
@@ -23,6 +19,13 @@ class HasPairs(Protocol):
 
     @property
     def pairs(self) -> list[list[str]]: ...
+
+
+class HasNodes(Protocol):
+    """Entry of a structure file that lists nodes."""
+
+    @property
+    def nodes(self) -> list[str]: ...
 
 
 class Member(NamedTuple):
@@ -45,6 +48,14 @@ def members(key: str, groups: Mapping[str, HasPairs]) -> Iterator[Member]:
     for name, group in groups.items():
         for place, nodes in enumerate(group.pairs):
             yield Member(f"{key}.{name}.pairs[{place}]", name, tuple(nodes))
+
+
+def nodes_of(key: str, entries: Mapping[str, HasNodes]) -> Iterator[tuple[str, str]]:
+    """Keys and names of the nodes that the entries of a section list, such as "joints.j.nodes[0]"
+    and "a". `key` is the section."""
+    for name, entry in entries.items():
+        for place, node in enumerate(entry.nodes):
+            yield f"{key}.{name}.nodes[{place}]", node
 
 
 def struts_by_name(struts: Iterable[Member]) -> dict[str, list[Member]]:
@@ -76,81 +87,3 @@ def unused_name(name: str, taken: Collection[str]) -> str:
     """The name itself; if it is taken, the first of "n-2", "n-3" and so on that is not."""
     names = (f"{name}-{number}" for number in itertools.count(2))
     return next(one for one in itertools.chain([name], names) if one not in taken)
-
-
-class _Group(BaseModel, extra="allow"):
-    pairs: list[Pair]
-
-
-class _Body(BaseModel, extra="allow"):
-    struts: list[str] = []
-    nodes: list[str] = []
-
-
-class _Pinned(BaseModel):
-    """The parts of a structure file that pinned nodes change."""
-
-    pinned: list[str]
-    nodes: Keyed[str, Any]
-    struts: Keyed[str, _Group] = {}
-    bodies: Keyed[str, _Body] = {}
-    joints: Keyed[str, Any] = {}
-
-    def expand(self) -> None:
-        """Gives each body but the first at a pinned node a copy of the node and a joint to it.
-
-        Nodes that are not pinned weld struts together, and so do the entries of `bodies`.
-        """
-        struts = [*members("struts", self.struts)]
-        named, index = struts_by_name(struts), {strut.key: i for i, strut in enumerate(struts)}
-        parts = [pair for group in self.struts.values() for pair in group.pairs]
-        parts += [body.nodes for body in self.bodies.values()]
-        welded: list[list[str | int]] = [
-            [part, *(node for node in nodes if node not in self.pinned)]
-            for part, nodes in enumerate(parts)
-        ]
-        for own, body in zip(welded[len(struts) :], self.bodies.values(), strict=True):
-            own += [index[strut.key] for name in body.struts for strut in named.get(name, ())]
-        body_of = {part: i for i, body in enumerate(components(welded)) for part in body}
-
-        for place, node in enumerate(self.pinned):
-            if node not in self.nodes:
-                found = f"found unknown node '{node}'; {hint(node, self.nodes)}"
-                refuse(f"pinned[{place}]", found)
-            here: dict[int, list[list[str]]] = {}
-            for part, nodes in enumerate(parts):
-                if node in nodes:
-                    here.setdefault(body_of[part], []).append(nodes)
-            if len(here) < 2:
-                expected = "expected a node that struts of two bodies share"
-                refuse(f"pinned[{place}]", f"found '{node}', {expected}")
-            for of_body in [*here.values()][1:]:
-                copy = unused_name(node, self.nodes | self.joints)
-                self.nodes[copy], self.joints[copy] = self.nodes[node], {"nodes": [node, copy]}
-                for nodes in of_body:
-                    nodes[:] = [copy if one == node else one for one in nodes]
-
-        renamed = dict[str, str]()
-        for old, new in zip(struts, members("struts", self.struts), strict=True):
-            renamed |= dict.fromkeys(old.names, new.names[0])
-        for entry in self.bodies.values():
-            entry.struts = [renamed.get(name, name) for name in entry.struts]
-
-
-def with_joints(tree: Tree) -> Tree:
-    """Content of a structure file with joints in place of its pinned nodes.
-
-    Struts that share a pinned node are one body there only if they also share another node, or if
-    `bodies` joins them. The body of the first strut at the node keeps it. Each other one has a copy
-    of it, named "l-2", "l-3" and so on for the node l, and a joint with the name of the copy.
-
-    Raises InputError, naming the key, for a pinned node that no two bodies share.
-    """
-    tree = tree_value(tree)
-    try:
-        given = _Pinned.model_validate(tree)
-    except ValidationError:  # the check of the whole structure tells what is wrong
-        return tree
-    given.expand()
-    changed = given.model_dump(exclude_unset=True)
-    return tree | changed | {"joints": given.joints, "pinned": []}

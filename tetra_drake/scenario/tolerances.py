@@ -44,8 +44,7 @@ class Tolerance(Section):
     law: Literal["normal", "uniform"] = "normal"
     """Law of the error."""
     each: bool = False
-    """True if each cable, strut or number has an error of its own, as coordinates always have;
-    otherwise all have one in common."""
+    """True if each cable, strut or number has an error of its own, as coordinates always have."""
     source: str = "assumed"
     """Where the tolerance is from, such as a data sheet."""
 

@@ -7,7 +7,7 @@ import functools
 import itertools
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from tetra_drake.errors import InputError
@@ -187,6 +187,13 @@ def hint(name: Any, names: Iterable[str]) -> str:
         return f"did you mean '{close[0]}'?"
     listed = textwrap.shorten(", ".join(names), _LONGEST_LIST, placeholder=" ...")
     return f"expected one of {listed}" if names else "expected none"
+
+
+def check_known(key: str, what: str, name: str, known: Collection[str]) -> None:
+    """Raises an InputError from a pydantic validator for a `name` that is none of the `known` ones.
+    `what` is what it names, such as "node". For `key` see refuse()."""
+    if name not in known:
+        refuse(key, f"found unknown {what} '{name}'; {hint(name, known)}")
 
 
 def no_such(what: str, name: str, shipped: Sequence[str]) -> str:

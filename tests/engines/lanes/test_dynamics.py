@@ -7,7 +7,6 @@ from helpers.kernels import Stepper
 from helpers.states import disturbed, mass_matrix
 
 from tetra_drake.engines.lanes.dynamics import Solver
-from tetra_drake.engines.lanes.sparse import BLOCK
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.forces import Forces
@@ -15,6 +14,7 @@ from tetra_drake.laws.friction import Coulomb, ResetIntegrator
 from tetra_drake.laws.kinematics import move_bodies
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Model
+from tetra_drake.laws.sparse import BLOCK
 from tetra_drake.laws.terrain import Flat, Rough
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
@@ -116,14 +116,3 @@ def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
         # Turned levers change torques, too: by the force, k times 1 mm, that is 0.001 k.
         upper = np.triu(stiffness[place, place]), np.triu(-jacobian[place, place])
         np.testing.assert_allclose(*upper, atol=0.003 * k)
-
-
-def test_the_implicit_matrix_has_the_stiffness_of_anchors():
-    robot, state, modes = held_robot("held")
-    damping, stiffness = damping_and_stiffness(robot, state, modes)
-    # The damping of an anchor is 1 ms times its stiffness; ropes have damping alone.
-    anchors = robot.anchors._replace(stiffness=0.0 * robot.anchors.stiffness)
-    without = robot._replace(anchors=anchors._replace(damping=anchors.stiffness))
-    others, _ = damping_and_stiffness(without, state, modes)
-    np.testing.assert_allclose(1e-3 * stiffness, damping - others, atol=1e-4)
-    assert stiffness.max() == pytest.approx(robot.anchors.stiffness.max())

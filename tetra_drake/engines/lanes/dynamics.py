@@ -11,7 +11,6 @@ from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
-from tetra_drake.engines.lanes.sparse import BLOCK, Schedule
 from tetra_drake.engines.lanes.touching import Touching
 from tetra_drake.kernels.compiling import compiled, inlined, merged
 from tetra_drake.kernels.lanes import Real, Table, any_lane, named, select
@@ -22,6 +21,7 @@ from tetra_drake.laws.forces import Forces, joint_spin, put_slip_slopes
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
 from tetra_drake.laws.model import WORLD, Joints, Model, carriers_of
+from tetra_drake.laws.sparse import BLOCK, Schedule
 from tetra_drake.laws.terrain import to_world
 from tetra_drake.laws.vectors import Vector3, cross, dot, put_vector, vector_at
 

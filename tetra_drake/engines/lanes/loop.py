@@ -19,7 +19,6 @@ import numpy as np
 
 from tetra_drake.engines.lanes.dynamics import Solver, StepMemory, accelerate
 from tetra_drake.engines.lanes.ros2 import larger, take_step
-from tetra_drake.engines.lanes.sparse import BLOCK
 from tetra_drake.kernels.compiling import inlined, merged
 from tetra_drake.kernels.lanes import (
     Real,
@@ -38,6 +37,7 @@ from tetra_drake.laws.forces import Forces, compute_forces, move_robot
 from tetra_drake.laws.kinematics import interpolate_state
 from tetra_drake.laws.mode_change import time_to_mode_change
 from tetra_drake.laws.model import Model
+from tetra_drake.laws.sparse import BLOCK
 from tetra_drake.laws.tally import Tally, observe
 
 IDLE, RUNNING, DONE, TOO_FAST, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS = range(6)

@@ -36,7 +36,6 @@ from __future__ import annotations
 import math
 
 from tetra_drake.engines.lanes.dynamics import Solver, StepMemory, implicit_matrix, momentum
-from tetra_drake.engines.lanes.sparse import BLOCK, factorise
 from tetra_drake.engines.lanes.touching import (
     add_touching,
     solve_touching,
@@ -48,6 +47,7 @@ from tetra_drake.laws.forces import Forces, compute_forces, move_robot
 from tetra_drake.laws.inertia import INERTIA_COLUMNS, over_inertia, times_inertia
 from tetra_drake.laws.kinematics import P_BN_W, move_bodies
 from tetra_drake.laws.model import Model
+from tetra_drake.laws.sparse import BLOCK, factorise
 from tetra_drake.laws.vectors import Vector3, cross, vector_at
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)

@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from tetra_drake.engines.lanes.sparse import Schedule, solve
 from tetra_drake.kernels.compiling import inlined, merged
 from tetra_drake.kernels.lanes import Real, Table, Truth, any_lane, named, select
 from tetra_drake.laws import capsules, contact
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.kinematics import FORCE, gather_forces
 from tetra_drake.laws.model import Model
+from tetra_drake.laws.sparse import Schedule, solve
 from tetra_drake.laws.vectors import put_vector
 
 

@@ -47,13 +47,9 @@ class Substructure(Section):
 
 
 class RigidParameters(Section):
-    """Parameters of a rod, box or sphere, with NTRT's defaults. Fields of type Any have no effect:
-    a scenario has its own friction, ground and actuators."""
+    """Parameters of a rod, box or sphere, with NTRT's defaults."""
 
     density: NotNegative = 1.0
-    friction: Any = None
-    roll_friction: Any = None
-    restitution: Any = None
 
 
 class RoundParameters(RigidParameters):
@@ -78,25 +74,12 @@ class BoxParameters(RigidParameters):
 
 
 class CableParameters(Section):
-    """Parameters of a cable, with NTRT's defaults. Fields of type Any have no effect."""
+    """Parameters of a cable, with NTRT's defaults."""
 
     density: ClassVar[float] = 0.0
     stiffness: Positive = 1000.0
     damping: NotNegative = 10.0
     pretension: NotNegative = 0.0
-    rotation: Any = None
-    history: Any = None
-    max_tension: Any = None
-    target_velocity: Any = None
-    min_actual_length: Any = None
-    min_rest_length: Any = None
-
-
-class BasicCableParameters(CableParameters):
-    """Parameters of a cable whose rest length is set directly, without a motor."""
-
-    moveCablePointAToEdge: Any = None
-    moveCablePointBToEdge: Any = None
 
 
 class KinematicCableParameters(CableParameters):
@@ -104,19 +87,29 @@ class KinematicCableParameters(CableParameters):
 
     radius: Positive = 1.0
     """Radius of the spool, which is not used."""
-    motor_friction: Any = None
-    motor_inertia: Any = None
-    back_drivable: Any = None
 
+
+def _with(parameters: type[Section], *without_effect: str) -> type[Section]:
+    """Parameters that a file may also give, but without effect: a scenario has its own friction,
+    ground and actuators. Their type is Any."""
+    fields: Any = {name: (Any, None) for names in without_effect for name in names.split()}
+    return pydantic.create_model(parameters.__name__, __base__=parameters, **fields)
+
+
+_OF_CONTACT = "friction roll_friction restitution"
+_OF_CABLE = "rotation history max_tension target_velocity min_actual_length min_rest_length"
+_ROUND, _BOX = _with(RoundParameters, _OF_CONTACT), _with(BoxParameters, _OF_CONTACT)
+_DIRECT = _with(CableParameters, _OF_CABLE, "moveCablePointAToEdge moveCablePointBToEdge")
+_MOTOR = _with(KinematicCableParameters, _OF_CABLE, "motor_friction motor_inertia back_drivable")
 
 CLASSES: dict[str, tuple[str, type[Section], str]] = {
-    "tgRodInfo": ("struts", RoundParameters, "rod"),
-    "tgBoxInfo": ("struts", BoxParameters, "box"),
-    "tgSphereInfo": ("spheres", RoundParameters, "sphere"),
-    "tgBasicActuatorInfo": ("cables", BasicCableParameters, "string"),
-    "tgBasicContactCableInfo": ("cables", BasicCableParameters, ""),
-    "tgKinematicActuatorInfo": ("cables", KinematicCableParameters, ""),
-    "tgKinematicContactCableInfo": ("cables", KinematicCableParameters, ""),
+    "tgRodInfo": ("struts", _ROUND, "rod"),
+    "tgBoxInfo": ("struts", _BOX, "box"),
+    "tgSphereInfo": ("spheres", _ROUND, "sphere"),
+    "tgBasicActuatorInfo": ("cables", _DIRECT, "string"),
+    "tgBasicContactCableInfo": ("cables", _DIRECT, ""),
+    "tgKinematicActuatorInfo": ("cables", _MOTOR, ""),
+    "tgKinematicContactCableInfo": ("cables", _MOTOR, ""),
 }
 """NTRT's builders by class: group in a structure file, parameters, and tag for which the builder is
 the default ("" for none)."""

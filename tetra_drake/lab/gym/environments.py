@@ -56,7 +56,6 @@ from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario
 from tetra_drake.scenario.metrics import METRICS
-from tetra_drake.scenario.scenario import Scenario
 
 try:
     import gymnasium
@@ -78,51 +77,107 @@ that rolls, by default on `roll`."""
 _SOURCE, _MASK, _RENDERED = "tetra_drake.gym", "reset_mask", "rgb_array"
 
 _OF_EPISODES = ("start", "steady", "offsets", "rewarded", "going")
-"""Attributes of _Episodes, without underscore, that are the state of the episodes."""
+"""Attributes of TensegrityVectorEnv, without underscore, that are the state of the episodes."""
 
 
-class _Episodes:
-    """Episodes of robots that are simulated together: observations, actions and rewards of all."""
+class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickle):
+    """Environments of many robots, which the compiled engine simulates in parallel; see
+    tetra_drake.gym. They behave like environments of one robot in Gymnasium's SyncVectorEnv.
+
+    By default a robot whose episode ends begins the next one in the next step, without a motion.
+    With the `autoreset_mode` "SameStep" it begins in the same step; its last observation is in
+    `final_obs` of the info.
+    """
+
+    metadata: Info = {"render_modes": [_RENDERED]}  # noqa: RUF012
 
     def __init__(
         self,
-        simulation: Simulation,
+        num_envs: int,
+        scenario: GivenScenario,
         *,
-        grouped: bool,
-        render_mode: str | None,
-        most_steps: int | None = None,
+        control_period: float | None = None,
+        grouped: bool = False,
+        record: bool = False,
+        workers: int | None = None,
+        max_episode_steps: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
     ) -> None:
-        """Takes the robots of a simulation, on which no episode has begun. An episode is truncated
-        after `most_steps` steps. For the other arguments, see TensegrityEnv."""
+        """Makes `num_envs` robots on a scenario. For the arguments not named here, see
+        TensegrityEnv. `workers` is the number of threads, one per core by default. Episodes are
+        truncated after `max_episode_steps`. `autoreset_mode` is "NextStep", "SameStep" or
+        "Disabled"."""
+        made: Info = {"control_period": control_period, "record": record, "workers": workers}
+        shown: Info = {"grouped": grouped, "render_mode": render_mode}
+        ended: Info = {"max_episode_steps": max_episode_steps, "autoreset_mode": autoreset_mode}
+        EzPickle.__init__(self, num_envs, scenario, **made, **shown, **ended)
         check_type(_SOURCE, "grouped", grouped, bool)
         if render_mode is not None and str(render_mode) != _RENDERED:
             problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"
             raise InputError(_SOURCE, "render_mode", problem)
-        if most_steps is not None:
-            check_whole(_SOURCE, "max_episode_steps", most_steps, least=1)
-        self.simulation, self._most_steps = simulation, most_steps
-        frames_per_second = max(1, round(1.0 / simulation.control_period))
-        self.metadata = {"render_modes": [_RENDERED], "render_fps": frames_per_second}
-        self._scenario: Scenario = simulation.scenario
-        robot, count, start = simulation.robot, simulation.count, simulation.state
-        by_network = Robot.of(self._scenario)
+        if max_episode_steps is not None:
+            check_whole(_SOURCE, "max_episode_steps", max_episode_steps, least=1)
+        try:
+            self._autoreset = AutoresetMode(autoreset_mode)
+        except ValueError:
+            modes = [mode.value for mode in AutoresetMode]
+            problem = f"found {autoreset_mode!r:.60}, expected one of {modes}"
+            raise InputError(_SOURCE, "autoreset_mode", problem) from None
+        self.simulation = simulation = Simulation(scenario, count=num_envs, **made)
+        self._most_steps, self._scenario = max_episode_steps, simulation.scenario
+        robot, start, by_network = simulation.robot, simulation.state, Robot.of(self._scenario)
         structure = by_network.structure if grouped else robot.structure
         self._groups = structure.cables["signal"][robot.driven]  # the action of each driven cable
         self._cables, self._weight = by_network.starting_cables(), robot.weight
         self._start_lengths = start.lengths[:1]
-        size = self._observe(start).shape[1]
-        self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)
-        self.action_space = spaces.Box(-1.0, 1.0, (self._groups.max() + 1,), np.float32)
         # Positions p_WN (N, nodes, 3) at the start and at `simulation.steady_from`.
         self._start, self._steady = start.p_WN, start.p_WN.copy()
-        self._offsets, self._rewarded = np.zeros(count), np.zeros(count)
-        self._going = np.zeros(count, dtype=bool)
+        self._offsets, self._rewarded = np.zeros(num_envs), np.zeros(num_envs)
+        self._going, self._ended = np.zeros((2, num_envs), dtype=bool)
+        self.generators = [seeding.np_random()[0] for _ in range(num_envs)]
+        """Generators of the robots (N,), which draw the seeds of their disturbances."""
+        self.num_envs, self.render_mode = num_envs, render_mode
+        frames_per_second = max(1, round(1.0 / simulation.control_period))
+        self.metadata = {"render_modes": [_RENDERED], "render_fps": frames_per_second}
+        self.metadata["autoreset_mode"] = self._autoreset
+        size, actions = self._observe(start).shape[1], self._groups.max() + 1
+        self.single_observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)
+        self.single_action_space = spaces.Box(-1.0, 1.0, (actions,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
 
-    def reset(self, places: np.ndarray, generators: Sequence[np.random.Generator]) -> np.ndarray:
-        """Begins episodes of the robots with the indices `places`. There is a generator for each
-        robot of the simulation; it draws the seed of the robot's disturbances. Returns the
-        observations of all robots (N, size)."""
-        seeds = [int(generators[place].integers(2**31)) for place in places]
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
+    ) -> tuple[np.ndarray, Info]:
+        """Begins episodes of all robots, or where `options["reset_mask"]` (N,) is True. `seed` is
+        the seed of the first robot, and the next integers are the seeds of the others; or it is a
+        list of seeds, one per robot. Returns the observations (N, size) and an empty info."""
+        _check_options(options, _MASK)
+        mask = (options or {}).get(_MASK, np.ones(self.num_envs, dtype=bool))
+        is_mask = isinstance(mask, np.ndarray) and mask.dtype == bool and mask.any()
+        if not is_mask or mask.shape != (self.num_envs,):
+            problem = f"found {mask!r:.60}, expected an array of {self.num_envs} truths, one True"
+            raise InputError(_SOURCE, f"options[{_MASK!r}]", problem)
+        if is_list(seed):
+            if len(seed) != self.num_envs:
+                problem = f"found {len(seed)} seeds, expected {self.num_envs}"
+                raise InputError(_SOURCE, "seed", problem)
+            seeds = [_checked_seed(each) for each in seed]
+        else:
+            first = _checked_seed(seed)
+            seeds = [None if first is None else first + i for i in range(self.num_envs)]
+        for place in np.flatnonzero(mask):
+            if seeds[place] is not None:
+                self.generators[place] = seeding.np_random(seeds[place])[0]
+        self._ended &= ~mask
+        return self._begin(mask), {}
+
+    def _begin(self, mask: np.ndarray) -> np.ndarray:
+        """Begins episodes of the robots where `mask` (N,) is True. Returns the observations of all
+        robots (N, size)."""
+        places = np.flatnonzero(mask)
+        seeds = [int(self.generators[place].integers(2**31)) for place in places]
         seen = self.simulation.reset(seed=seeds, indices=places)
         readings = self.simulation.state
         self._going[places] = True
@@ -133,22 +188,24 @@ class _Episodes:
         return self._observe(seen)
 
     def step(
-        self, actions: np.ndarray, places: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Simulates a control period of the robots with the indices `places`; the others pause.
-        `actions` (N, actions) are shares of the typical amplitude, see tetra_drake.gym. Returns
-        observations (N, size), rewards (N,), and whether episodes are terminated (N,) and truncated
-        (N,), of all robots. Raises InputError for a robot without an episode."""
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
+        """Simulates a control period. `actions` (N, actions) are shares of the typical amplitude,
+        see tetra_drake.gym. Raises InputError for a robot without an episode."""
         simulation = self.simulation
-        if (over := places[~self._going[places]]).size:
-            raise InputError(_SOURCE, "step", f"robot {over[0]} has no episode; reset() begins one")
-        seen = simulation.step(self._setpoints(actions), indices=places)
+        again = self._ended & (self._autoreset == AutoresetMode.NEXT_STEP)
+        if again.any():
+            self._begin(again)
+        if (over := ~(again | self._going)).any():
+            problem = f"robot {over.argmax()} has no episode; reset() begins one"
+            raise InputError(_SOURCE, "step", problem)
+        seen = simulation.step(self._setpoints(actions), indices=np.flatnonzero(~again))
         readings = simulation.state
         early = readings.time <= self._scenario.simulation.settling_time
         self._steady[early] = readings.p_WN[early]
         terminated = np.array([failure is not None for failure in simulation.failures])
         truncated = simulation.ended & ~terminated
-        robots = range(simulation.count)
+        robots = range(self.num_envs)
         fitness = np.array([self._fitness(readings, robot) for robot in robots]) - self._offsets
         for place in np.flatnonzero(truncated).tolist():
             try:
@@ -159,19 +216,28 @@ class _Episodes:
         if self._most_steps is not None:
             steps = readings.time / simulation.control_period
             truncated |= ~terminated & (steps > self._most_steps - 0.5)
-        self._going &= ~(terminated | truncated)
-        rewards = fitness - self._rewarded
+        self._ended = terminated | truncated
+        self._going &= ~self._ended
+        observed, rewards = self._observe(seen), fitness - self._rewarded
         self._rewarded = fitness
-        return self._observe(seen), rewards, terminated, truncated
+        if self._autoreset != AutoresetMode.SAME_STEP or not self._ended.any():
+            return observed, rewards, terminated, truncated, {}
+        last = np.full(self.num_envs, None, dtype=object)
+        for place in np.flatnonzero(self._ended).tolist():
+            last[place] = observed[place]
+        info: Info = {"final_obs": last, "_final_obs": self._ended, "final_info": {}}
+        info["_final_info"] = self._ended
+        return self._begin(self._ended), rewards, terminated, truncated, info
 
     def save(self) -> States:
-        """States of all robots and their episodes."""
+        """States of all robots and their episodes; see restore()."""
         states = self.simulation.save(history=True)
         own = {f"episode.{name}": getattr(self, f"_{name}").copy() for name in _OF_EPISODES}
         return dataclasses.replace(states, tables={**states.tables, **own})
 
     def restore(self, states: States) -> np.ndarray:
-        """Puts all robots and their episodes into saved states; returns the observations."""
+        """Puts the robots and their episodes into saved states, and returns the observations.
+        Raises InputError for states of another scenario, or of a simulation."""
         check_type(_SOURCE, "states", states, States)
         if "episode.going" not in states.tables:
             problem = "found states of a simulation, expected states of an environment"
@@ -179,7 +245,16 @@ class _Episodes:
         readings = self.simulation.restore(states)
         for name in _OF_EPISODES:
             getattr(self, f"_{name}")[:] = states.tables[f"episode.{name}"]
+        self._ended = ~self._going
         return self._observe(readings)
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Pictures (height, width, 3) of the robots now, in RGB; None without a `render_mode`."""
+        from tetra_drake.lab.gym.picture import picture
+
+        if not self.render_mode:
+            return None
+        return tuple(picture(self.simulation.robot, p_WN) for p_WN in self.simulation.state.p_WN)
 
     def _fitness(self, readings: Readings, place: int) -> float:
         """Fitness of the robot with the index `place` up to now, without the metrics that are known
@@ -197,17 +272,10 @@ class _Episodes:
     def _setpoints(self, actions: np.ndarray) -> np.ndarray:
         """Setpoints (N, driven cables) of the actuators, in SI units, for actions (N, actions) of
         the environment. Each is a force, free length or tension, depending on the actuators."""
-        shape = self.simulation.count, *self.action_space.shape
-        actions = checked_actions(actions, shape, source="tetra_drake.gym")
+        shape = self.num_envs, self._groups.max() + 1
+        actions = checked_actions(actions, shape, source=_SOURCE)
         signals = self._scenario.cpg.usual_amplitude * actions[:, self._groups]
         return np.asarray(self._scenario.actuation.commands(self._cables._replace(signal=signals)))
-
-    def pictures(self) -> tuple[np.ndarray, ...]:
-        """Pictures (height, width, 3) of all robots now, in RGB; see lab.gym.picture."""
-        from tetra_drake.lab.gym.picture import picture
-
-        simulation = self.simulation
-        return tuple(picture(simulation.robot, p_WN) for p_WN in simulation.state.p_WN)
 
     def _observe(self, readings: Readings) -> np.ndarray:
         """Observations of all robots (N, size) from their state; the module's docstring lists the
@@ -249,151 +317,46 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
         Raises:
             InputError: if an argument does not fit the scenario.
         """
-        options: Info = {"grouped": grouped, "render_mode": render_mode}
-        EzPickle.__init__(self, scenario, control_period=control_period, record=record, **options)
-        simulation = Simulation(scenario, control_period=control_period, record=record, workers=1)
-        self._episodes = _Episodes(simulation, **options)
-        self.metadata, self.render_mode = self._episodes.metadata, render_mode
-        self.observation_space = self._episodes.observation_space
-        self.action_space = self._episodes.action_space
+        options: Info = {"control_period": control_period, "grouped": grouped, "record": record}
+        options["render_mode"] = render_mode
+        EzPickle.__init__(self, scenario, **options)
+        never = AutoresetMode.DISABLED
+        self._one = TensegrityVectorEnv(1, scenario, workers=1, autoreset_mode=never, **options)
+        self.metadata, self.render_mode = self._one.metadata, render_mode
+        self.observation_space = self._one.single_observation_space
+        self.action_space = self._one.single_action_space
 
     def reset(
         self, *, seed: int | None = None, options: Info | None = None
     ) -> tuple[np.ndarray, Info]:
         _check_options(options)
         super().reset(seed=_checked_seed(seed))
-        return self._episodes.reset(np.array([0]), [self.np_random])[0], {}
+        self._one.generators = [self.np_random]
+        return self._one.reset()[0][0], {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
-        seen, rewards, terminated, truncated = self._episodes.step(action, np.array([0]))
-        return seen[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), {}
+        seen, rewards, terminated, truncated, info = self._one.step(action)
+        return seen[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), info
 
     def render(self) -> np.ndarray | None:
         """The picture (height, width, 3) of the robot now; None without a `render_mode`."""
-        return self._episodes.pictures()[0] if self.render_mode else None
+        pictures = self._one.render()
+        return None if pictures is None else pictures[0]
 
     def save(self) -> States:
         """State of the robot and its episode; see restore()."""
-        return self._episodes.save()
+        return self._one.save()
 
     def restore(self, states: States) -> np.ndarray:
         """Puts the robot and its episode into a saved state, and returns the observation. Raises
         InputError for states of another scenario, or of a simulation."""
-        return self._episodes.restore(states)[0]
+        return self._one.restore(states)[0]
 
     def result(self) -> SimulationResult:
         """The result of the last episode, which must have reached `simulation.duration`; available
         until the next reset(). Raises its SimulationFailure if the robot failed, and InputError if
         the episode has not ended."""
-        return self._episodes.simulation.result()
-
-
-class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickle):
-    """Environments of many robots, which the compiled engine simulates in parallel; see
-    tetra_drake.gym. They behave like environments of one robot in Gymnasium's SyncVectorEnv.
-
-    By default a robot whose episode ends begins the next one in the next step, without a motion.
-    With the `autoreset_mode` "SameStep" it begins in the same step; its last observation is in
-    `final_obs` of the info.
-    """
-
-    metadata: Info = {"render_modes": [_RENDERED]}  # noqa: RUF012
-
-    def __init__(
-        self,
-        num_envs: int,
-        scenario: GivenScenario,
-        *,
-        control_period: float | None = None,
-        grouped: bool = False,
-        workers: int | None = None,
-        max_episode_steps: int | None = None,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        render_mode: str | None = None,
-    ) -> None:
-        """Makes `num_envs` robots on a scenario. For the arguments not named here, see
-        TensegrityEnv. `workers` is the number of threads, one per core by default. Episodes are
-        truncated after `max_episode_steps`. `autoreset_mode` is "NextStep", "SameStep" or
-        "Disabled"."""
-        options: Info = {"grouped": grouped, "render_mode": render_mode}
-        made: Info = {"control_period": control_period, "workers": workers}
-        ended: Info = {"max_episode_steps": max_episode_steps, "autoreset_mode": autoreset_mode}
-        EzPickle.__init__(self, num_envs, scenario, **options, **made, **ended)
-        try:
-            self._autoreset = AutoresetMode(autoreset_mode)
-        except ValueError:
-            modes = [mode.value for mode in AutoresetMode]
-            problem = f"found {autoreset_mode!r:.60}, expected one of {modes}"
-            raise InputError(_SOURCE, "autoreset_mode", problem) from None
-        simulation = Simulation(scenario, count=num_envs, **made)
-        self._episodes = _Episodes(simulation, **options, most_steps=max_episode_steps)
-        self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
-        self._ended = np.zeros(num_envs, dtype=bool)
-        self.num_envs, self.render_mode = num_envs, render_mode
-        self.metadata = self._episodes.metadata | {"autoreset_mode": self._autoreset}
-        self.single_observation_space = self._episodes.observation_space
-        self.single_action_space = self._episodes.action_space
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-
-    def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
-    ) -> tuple[np.ndarray, Info]:
-        """Begins episodes of all robots, or where `options["reset_mask"]` (N,) is True. `seed` is
-        the seed of the first robot, and the next integers are the seeds of the others; or it is a
-        list of seeds, one per robot. Returns the observations (N, size) and an empty info."""
-        _check_options(options, _MASK)
-        mask = (options or {}).get(_MASK, np.ones(self.num_envs, dtype=bool))
-        is_mask = isinstance(mask, np.ndarray) and mask.dtype == bool and mask.any()
-        if not is_mask or mask.shape != (self.num_envs,):
-            problem = f"found {mask!r:.60}, expected an array of {self.num_envs} truths, one True"
-            raise InputError(_SOURCE, f"options[{_MASK!r}]", problem)
-        if is_list(seed):
-            if len(seed) != self.num_envs:
-                problem = f"found {len(seed)} seeds, expected {self.num_envs}"
-                raise InputError(_SOURCE, "seed", problem)
-            seeds = [_checked_seed(each) for each in seed]
-        else:
-            first = _checked_seed(seed)
-            seeds = [None if first is None else first + i for i in range(self.num_envs)]
-        for place in np.flatnonzero(mask):
-            if seeds[place] is not None:
-                self._generators[place] = seeding.np_random(seeds[place])[0]
-        self._ended &= ~mask
-        return self._episodes.reset(np.flatnonzero(mask), self._generators), {}
-
-    def step(
-        self, actions: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
-        again = self._ended & (self._autoreset == AutoresetMode.NEXT_STEP)
-        if again.any():
-            self._episodes.reset(np.flatnonzero(again), self._generators)
-        seen, rewards, terminated, truncated = self._episodes.step(actions, np.flatnonzero(~again))
-        self._ended = terminated | truncated
-        if self._autoreset != AutoresetMode.SAME_STEP or not self._ended.any():
-            return seen, rewards, terminated, truncated, {}
-        last = np.full(self.num_envs, None, dtype=object)
-        for place in np.flatnonzero(self._ended).tolist():
-            last[place] = seen[place]
-        info: Info = {"final_obs": last, "_final_obs": self._ended, "final_info": {}}
-        info["_final_info"] = self._ended
-        seen = self._episodes.reset(np.flatnonzero(self._ended), self._generators)
-        return seen, rewards, terminated, truncated, info
-
-    def save(self) -> States:
-        """States of all robots and their episodes; see restore()."""
-        return self._episodes.save()
-
-    def restore(self, states: States) -> np.ndarray:
-        """Puts the robots and their episodes into saved states, and returns the observations.
-        Raises InputError for states of another scenario, or of a simulation."""
-        seen = self._episodes.restore(states)
-        self._ended = ~states.tables["episode.going"]
-        return seen
-
-    def render(self) -> tuple[np.ndarray, ...] | None:
-        """Pictures (height, width, 3) of the robots now; None without a `render_mode`."""
-        return self._episodes.pictures() if self.render_mode else None
+        return self._one.simulation.result()
 
 
 def _checked_seed(seed: Any) -> int | None:

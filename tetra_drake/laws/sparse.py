@@ -78,6 +78,12 @@ class Schedule(NamedTuple):
         pairs = zip(rows, self.later[bodies:].tolist(), strict=True)
         return {pair: bodies + k for k, pair in enumerate(pairs)}
 
+    @property
+    def work(self) -> float:
+        """Work of a factorisation, as for a full matrix whose size cubed is this number."""
+        lengths = BLOCK * (1 + np.diff(self.first)[:, np.newaxis]) - np.arange(BLOCK)
+        return 3.0 * float((lengths**2).sum())
+
 
 def minimum_degree_order(bodies: int, pairs: Iterable[tuple[int, int]]) -> np.ndarray:
     """Order of elimination (bodies,) with little fill-in: the next body is mostly one with the
