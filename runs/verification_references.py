@@ -1,4 +1,4 @@
-"""Structures of the problems of verification/problems.yaml that are made by rules, and references.
+"""References of the problems of verification/problems.yaml.
 
 A reference is a formula of the file, see formula(), or a function here. It knows the numbers of the
 problem, not the engines.
@@ -6,9 +6,8 @@ problem, not the engines.
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from types import CodeType
 from typing import Any
 
@@ -76,23 +75,6 @@ def formula(times: Array, case: Case) -> Array:
 # Bodies
 
 
-def four_bar_tree(windows: int, rod: Case) -> dict[str, Any]:
-    """Cranks a-b and couplers between them."""
-    nodes, pairs = {"w": [0, 9, 0]}, [[f"a{i}", f"b{i}"] for i in range(windows + 1)]
-    for i in range(windows + 1):
-        nodes |= {f"a{i}": [i, 0, 0], f"b{i}": [i, 0, 1]}
-    pairs += [[f"b{i}", f"b{i + 1}"] for i in range(windows)]
-    spin = {"velocity": ["-0.5 m/s", 0, 0], "spin": [0, "1 rad/s", 0]}
-    cranks = {f"a{i} b{i}": spin for i in range(windows + 1)}
-    return {
-        "nodes": nodes,
-        "struts": {"rod": {**rod, "pairs": pairs}},
-        "pinned": [f"b{i}" for i in range(windows + 1)],
-        "anchors": {"w": "xyz"} | {f"a{i}": "xyz" for i in range(windows + 1)},
-        "start": {"rest": False, "velocity": ["1 m/s", 0, 0], "bodies": cranks},
-    }
-
-
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 0, -1], [1, 1, -1], [0, 1, -1], [0, 1, 0]], float)
 AXES = np.cross(POINTS - np.roll(POINTS, 1, axis=0), np.roll(POINTS, -1, axis=0) - POINTS)
 """Joints of Bricard's linkage, along edges of a cube, and their axes."""
@@ -150,41 +132,7 @@ def free_body(times: Array, case: Case) -> Array:
     return centre[axis] + turning(inertia, spin, arm, times)[:, axis]
 
 
-# Contact
-
-
-def disk_tree(count: int, disk: Case) -> dict[str, Any]:
-    """A disk of 0.1 m as a ring of nodes."""
-    angles = 2.0 * np.pi * np.arange(count) / count - 0.5 * np.pi
-    nodes = {f"r{i}": [0.1 * math.cos(a), 0.1 * math.sin(a), 0] for i, a in enumerate(angles)}
-    body = {**disk, "nodes": [*nodes], "centre": [0, 0, 0]}
-    return {"nodes": nodes | {"w": [0, 9, 0]}, "bodies": {"disk": body}, "contacts": [*nodes]}
-
-
 # Cables
-
-
-def chain_tree(count: int, law: Case) -> dict[str, Any]:
-    """A folded chain."""
-    places = [[0.02 * (i > count / 2), 0, -0.05 * min(i, count - i)] for i in range(count + 1)]
-    return beads_tree(places, count, law)
-
-
-def rope_tree(count: int, law: Case) -> dict[str, Any]:
-    """A rope between two walls."""
-    angles = np.pi * np.arange(count + 2) / (count + 1)
-    places = [[0.025 * i, 0, 1e-4 * math.sin(a)] for i, a in enumerate(angles)]
-    return beads_tree(places, count, law)
-
-
-def beads_tree(places: Sequence[Sequence[float]], count: int, law: Case) -> dict[str, Any]:
-    """Beads of 10 g on cables; those at the ends, which are held, have no mass."""
-    nodes = {f"b{i}": place for i, place in enumerate(places)}
-    return {
-        "nodes": nodes,
-        "masses": {f"b{i}": "10 g" for i in range(1, count + 1)},
-        "cables": {"link": {**law, "pairs": [list(pair) for pair in itertools.pairwise(nodes)]}},
-    }
 
 
 def on_cables(times: Array, case: Case) -> Array:

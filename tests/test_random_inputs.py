@@ -18,10 +18,8 @@ import traceback
 from collections import Counter
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, ClassVar
 
 import bench
-import mujoco
 import numpy as np
 import pytest
 import yaml
@@ -29,18 +27,13 @@ from helpers.brief import BRIEF
 from helpers.files import DATA
 from helpers.policies import Given
 from pydrake.common import RandomGenerator
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
 
 import tetra_drake as td
 from tetra_drake.cli import main
 from tetra_drake.engines.drake import MakeDisturbedSimulator, MakeSimulator
-from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.lab.bridges.conversion import converted
-from tetra_drake.lab.bridges.sdf import make_sdf
 from tetra_drake.lab.gym.environments import TensegrityVectorEnv
-from tetra_drake.laws.terrain import Grid, Relief
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
@@ -51,7 +44,7 @@ INPUTS, SEED, LONGEST = int(os.environ.get("INPUTS", "600")), int(os.environ.get
 PRISM = td.load_scenario("prism").with_changes(BRIEF | {"engine": "!Compiled"})
 TREE = yaml.safe_load((Path(td.__file__).parent / "scenario/structures/prism.yaml").read_text())
 GIVEN = yaml.safe_load(Path(__file__).with_name("random_inputs.yaml").read_text("utf-8"))
-SPREAD = {"disturbances": GIVEN["disturbances"]}
+SPREAD = GIVEN["sections"]["disturbances"]
 PLAIN = [None, True, -1, 0, 2, 3.5, math.nan, math.inf, 1e300]
 PLAIN += ["", "x", "1 m", "-3 N", [], {}, [1, 2]]
 ODD = [*PLAIN, b"x", object(), np.zeros(3), np.full((6, 6), np.nan), {"a": 1}, [[math.nan] * 6]]
@@ -172,28 +165,10 @@ def commanded(rng, folder):
         raise InputError(command, "", "refused")
 
 
-def begun(rng, folder):
-    start, push = mutated(rng, GIVEN["start"]), mutated(rng, GIVEN["push"])
-    changes = rng.choice([{"robot.start": start}, {"events": [push]}])
-    td.simulate(PRISM.with_changes(changes), td.seeded_gait(PRISM, 1))
-
-
-class Surface(Relief):
-    """A terrain of a plug-in with heights that do not fit."""
-
-    given: ClassVar[Any] = None
-
-    def grid(self, *, ahead, scale, source):
-        return self.given
-
-
 def plugged(rng, folder):
     Given.answer = rng.choice([*ODD, np.zeros((1, 6))])
     Given.bounds = rng.choice([*ODD, (0.0, 1.0)])
-    odd_grid = odd(rng, heights=np.zeros((3, 3)), start=(-1.0, -1.0), cell=(1.0, 1.0))
-    Surface.given = rng.choice([Grid(*odd_grid.values()), *ODD])
-    section = rng.choice([{"policy": Given()}, {"terrain": Surface()}])
-    scenario = PRISM.with_sections(**section)
+    scenario = PRISM.with_sections(policy=Given())
     td.simulate(scenario, td.seeded_gait(scenario, 1))
 
 
@@ -222,22 +197,6 @@ def played(rng, folder):
     env.step(either(rng, env.action_space.sample()))
 
 
-def named(rng, folder):
-    """Drake and MuJoCo read what is written of a robot whose parts have odd names."""
-    old = rng.choice(["n0", "n4", "bar", "side"])
-    new = "".join(rng.choices([*GIVEN["names"], "x" * 300], k=rng.choice([1, 2])))
-    text = re.sub(
-        rf"\b{old}\b", lambda _: json.dumps(new, ensure_ascii=False)[1:-1], json.dumps(TREE)
-    )
-    (folder / "a.yaml").write_text(text, "utf-8")
-    plain = PRISM.with_changes({"friction.stiffness": "0 N/m"}).on_engine("mujoco")
-    robot = Robot.of(plain.with_sections(robot=read_structure(folder / "a.yaml")))
-    mujoco.MjModel.from_xml_string(make_mjcf(robot))
-    sdf = make_sdf(robot.structure, robot.structure.initial_state, name=new)
-    Parser(plant := MultibodyPlant(0.0)).AddModelsFromString(sdf, "sdf")
-    assert all(plant.HasFrameNamed(f"node {node}") for node in robot.structure.node_names)
-
-
 def sprung(rng, folder):
     cables = TREE["cables"] | mutated(rng, GIVEN["springs"])
     text = yaml.dump(TREE | {"cables": cables})
@@ -246,15 +205,10 @@ def sprung(rng, folder):
     return Robot.of(PRISM.with_sections(robot=read_structure(file))).equilibrium
 
 
-def sensed(rng, folder):
-    scenario = PRISM.with_file({"sensing": mutated(rng, GIVEN["errors"])}, "a")
-    return td.Simulation(scenario, count=1).step(np.zeros((1, 6)))
-
-
-def waving(rng, folder):
-    tree = mutated(rng, GIVEN["waves"])
-    waves = PRISM.with_changes({"cpg": "!Phase " + yaml.safe_dump(tree, default_flow_style=True)})
-    td.simulate(waves, td.seeded_gait(waves, 1))
+def sectioned(tree, rng, folder):
+    scenario = PRISM.with_file(mutated(rng, tree), "a")
+    td.simulate(scenario, td.seeded_gait(scenario, 1))
+    td.Simulation(scenario).step(np.zeros((1, 6)))
 
 
 def read(rng, folder):
@@ -263,13 +217,8 @@ def read(rng, folder):
 
 
 SURFACES = {
-    "oscillators": waving,
     "gait files": read,
     "structures": lambda r, f: read_structure(garbled(r, f, ".yaml", yaml.dump(mutated(r, TREE)))),
-    "scenarios": lambda r, f: PRISM.with_file(
-        mutated(r, {"simulation": {}, "cpg": {}} | SPREAD), "a"
-    ),
-    "starts and pushes": begun,
     "MJCF": lambda r, f: converted(garbled(r, f, ".xml", (DATA / "mjcf/others.xml").read_text())),
     "NTRT": lambda r, f: converted(
         garbled(r, f, ".yaml", (DATA / "ntrt/prism.yaml").read_text()), unit="dm"
@@ -304,10 +253,8 @@ SURFACES = {
     "bench": entered,
     "Simulation": stepped,
     "gym": played,
-    "names": named,
     "springs": sprung,
-    "sensing": sensed,
-}
+} | {name: functools.partial(sectioned, tree) for name, tree in GIVEN["sections"].items()}
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """Controllers: functions of time and readings in place of a gait, and systems on the diagram."""
 
-import functools
-
 import numpy as np
 import pytest
 from helpers.controllers import Springs, follow_waves
@@ -29,11 +27,6 @@ def walking() -> Scenario:
     settings = {"friction.stiffness": "0 N/m", "simulation.sample_period": "30 ms"}
     settings["robot.tetrahedra"] = 3
     return shortly(load_scenario("coulomb"), 0.6, **settings)
-
-
-@pytest.fixture
-def controller(walking):
-    return functools.partial(follow_waves, controlled_robot(walking))
 
 
 @pytest.mark.parametrize("kind", [RuntimeError, InputError, KeyboardInterrupt])
@@ -67,13 +60,13 @@ def moved_as_simulate_does(
     return result
 
 
-def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
+def test_the_controller_of_a_diagram_is_that_of_simulate(walking):
     """The function is called at the same times, and its forces are held."""
     robot, times = controlled_robot(walking), list[float]()
 
     def law(time: float, readings: Readings) -> np.ndarray:
         times.append(time)
-        return controller(time, readings)
+        return follow_waves(robot, time, readings)
 
     system = SampledController(robot, law, period=0.02)
     diagram = MakeTensegrityDiagram(robot, controller=system)

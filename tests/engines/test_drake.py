@@ -1,10 +1,10 @@
 """The Drake diagram: against the independent simulation, and with live signals."""
 
-from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from helpers.converged import shortly
 from pydrake.systems.framework import Context
 
 from tetra_drake.engines.drake import MakeSimulator, default_scheme
@@ -12,13 +12,10 @@ from tetra_drake.engines.sampler import Sampler
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.terrain import Rough
 from tetra_drake.results.trajectory import make_dataset
-from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.gait_file import load_gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 PORTS = {"signal": "signals", "tension": "tensions", "length": "lengths"}
@@ -26,16 +23,11 @@ PORTS |= {"normal_force": "normal_forces", "friction_force": "friction_forces"}
 """Output ports of the diagram, by the variables of a trajectory."""
 
 
-@pytest.fixture
-def gait(scenario: Scenario, data: Path) -> Gait:
-    return load_gait(data / "gait_e.json", scenario)
-
-
-def test_the_work_counts_all_steps_from_the_start(scenario, gait):
+def test_the_work_counts_all_steps_from_the_start(scenario):
     # New Jacobians after mode changes clear the integrator's own counts.
-    times = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.5 s"}
+    short = shortly(scenario, 1.0)
     viewer = Mock(wants=Mock(return_value=False))
-    work = simulate(scenario=scenario.with_changes(times), gait=gait, viewer=viewer).integrator
+    work = simulate(short, seeded_gait(short), viewer=viewer).integrator
     ends = {call.args for call in viewer.wants.call_args_list}
     assert work.steps == len(ends)  # AdvanceTo(0) counts as a step, of no length
     assert work.derivative_evaluations > work.jacobian_evaluations > 0

@@ -1,10 +1,10 @@
 """Feet with a radius: spheres that stand, roll and slide on the ground."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
+from helpers.anchored import scenario_of
 from helpers.converged import CONVERGED, shortly
 from helpers.laws import COULOMB, FIRM, RESET
 from helpers.states import energy_and_momenta
@@ -20,7 +20,6 @@ from tetra_drake.laws.terrain import Rough
 from tetra_drake.robot.ground import foot_gaps
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 
@@ -31,15 +30,9 @@ WHEELS = {"nodes": {"a": [0.0, -0.2, RADIUS], "b": [0.0, 0.2, RADIUS]}, "struts"
 SURE = "!Coulomb {static: 0.9, kinetic: 0.9, stiffness: 0 N/m, damping: 2 kN*s/m}"
 
 
-def on_prisms_ground(tree: dict[str, Any], **changes: object) -> Scenario:
-    """A structure on the ground of the prism."""
-    robot = StructureFile.model_validate(tree)
-    return shortly(load_scenario("prism").with_sections(name="feet", robot=robot), 0.5, **changes)
-
-
 def wheels() -> Robot:
     stiff = {"ground.stiffness": "100 kN/m", "friction": SURE}
-    return Robot.of(on_prisms_ground(WHEELS, **stiff))
+    return Robot.of(scenario_of(WHEELS, 0.5, terrain="!Flat", **stiff))
 
 
 SMOOTH = "!Coulomb {static: 1e-9, kinetic: 1e-9}"
@@ -76,9 +69,9 @@ def dropped(terrain: str, seed: int, *, damped: bool, duration: float) -> Scenar
     damping = 2.0 * stiffness if damped else 0.0
     changes = {"ground.stiffness": f"{stiffness} N/m", "ground.damping": f"{damping} N*s/m^2"}
     changes["friction"] = "!Coulomb {static: 0.5, kinetic: 0.4}" if damped else SMOOTH
-    changes |= {"simulation.duration": f"{duration} s", "simulation.sample_period": "5 ms"}
+    changes["simulation.sample_period"] = "5 ms"
     fine = "!Compiled {tolerance: 1e-6 m/s, max_step: 1 ms}"
-    return on_prisms_ground(tree, engine=fine, terrain=RUGGED[terrain], **changes)
+    return scenario_of(tree, duration, engine=fine, terrain=RUGGED[terrain], **changes)
 
 
 DROPS = [(name, i, 0.5) for i, name in enumerate(RUGGED)]
@@ -132,8 +125,8 @@ def test_a_foot_is_as_thick_as_its_sphere_else_as_its_strut_unless_the_file_says
 
 def test_a_foot_below_the_ground_that_anchors_keep_there_is_refused(refused):
     tree = WHEELS | {"nodes": {"a": [0.0, 0.0, 0.0], "b": [0.0, 0.4, 0.0]}, "anchors": {"b": "z"}}
-    with refused("feet", "robot.nodes.a", "radius"):
-        Robot.of(on_prisms_ground(tree))
+    with refused("anchored", "robot.nodes.a", "radius"):
+        Robot.of(scenario_of(tree, terrain="!Flat"))
 
 
 def test_the_deflection_of_a_foot_that_rolls_and_pivots_is_how_far_it_slid():

@@ -339,16 +339,9 @@ def test_the_smallest_vibrations_keep_their_damping(frequency, ratio, size, engi
     # A ball between six springs of 0.5 m, whose tension holds it sideways as well.
     mass, tension, rate = 0.05, 0.2, 2.0 * np.pi * frequency
     stiffness = 0.5 * (mass * rate**2 - 8.0 * tension)
-    ends = {f"e{i}": [*place] for i, place in enumerate(0.5 * np.vstack([np.eye(3), -np.eye(3)]))}
     springs = {"stiffness": stiffness, "damping": ratio * mass * rate, "tension": tension}
-    tree = {
-        "nodes": {"ball": [0.0, 0.0, 0.0]} | ends,
-        "masses": {"ball": mass},
-        "cables": {"springs": springs | {"pairs": [["ball", end] for end in ends]}},
-        "anchors": dict.fromkeys(ends, "xyz"),
-        "offsets": [[size, 0.0, 0.0]],
-        "gravity": 0.0,
-    }
+    cables = {"springs": TREES["vibrating"]["cables"]["springs"] | springs}
+    tree = TREES["vibrating"] | {"cables": cables, "offsets": [[size, 0.0, 0.0]]}
     scenario = scenario_of(tree, 10.0 / frequency, engine=engine)
     robot = Robot.of(scenario)
     end = simulate(scenario, seeded_gait(scenario), record=True).trajectory.isel(time=-1)

@@ -3,12 +3,10 @@
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from helpers.anchored import BAR
-from helpers.converged import shortly
+from helpers.anchored import BAR, scenario_of
 from tetra_drake.laws.capsules import HuntCrossley
+from tetra_drake.laws.terrain import Flat, Nothing
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_structure import StructureFile
 
 RADIUS = 0.5 * BAR["diameter"]
 """Radius of a bar in m."""
@@ -36,25 +34,14 @@ def loose_bars(
     anchors: Mapping[str, str] = MappingProxyType({}),
 ) -> Robot:
     """A robot of bars between ends (m): a0 and b0, a1 and b1, and so on. They touch by the law of
-    Hunt and Crossley, with a dissipation in s/m. Without gravity they are a metre above the
-    ground."""
-    height = 1.0 if gravity == 0.0 else 0.0
+    Hunt and Crossley, with a dissipation in s/m. Without gravity there is no ground."""
     nodes = {f"a{i}": list(pair[0]) for i, pair in enumerate(ends)}
     nodes |= {f"b{i}": list(pair[1]) for i, pair in enumerate(ends)}
     struts = {f"bar{i}": BAR | {"pairs": [[f"a{i}", f"b{i}"]]} for i in range(len(ends))}
     pairs = [["a0", f"a{i}"] for i in range(1, len(ends))]
     loose = {"pairs": pairs, "stiffness": 1.0, "damping": 0.0, "free_length": 99.0}
-    scenario = load_scenario("prism").with_sections(
-        robot=StructureFile(
-            nodes=nodes,
-            struts=struts,
-            cables={"loose": loose},
-            gravity=gravity,
-            anchors=dict(anchors),
-            offsets=[[0.0, 0.0, height]] * len(ends),
-        ),
-        strut_contact=HuntCrossley(stiffness=STIFFNESS, dissipation=dissipation),
-    )
-    fine = {"engine.tolerance": "1e-6 m/s", "engine.max_step": "1 ms"}
-    fine["simulation.sample_period"] = "1 ms"
-    return Robot.of(shortly(scenario, duration, **fine))
+    tree = {"nodes": nodes, "struts": struts, "cables": {"loose": loose}, "gravity": gravity}
+    changes = {"engine.tolerance": "1e-6 m/s", "engine.max_step": "1 ms"}
+    changes |= {"simulation.sample_period": "1 ms", "terrain": Flat() if gravity else Nothing()}
+    changes["strut_contact"] = HuntCrossley(stiffness=STIFFNESS, dissipation=dissipation)
+    return Robot.of(scenario_of(tree | {"anchors": dict(anchors)}, duration, **changes))

@@ -9,6 +9,7 @@ from tetra_drake.kernels.lanes import Real, Table
 from tetra_drake.kernels.packed import Packed, allocate, unpacked
 from tetra_drake.laws.forces import Forces, compute_forces, move_robot, sizes_of
 from tetra_drake.laws.model import Model
+from tetra_drake.laws.sparse import Schedule
 
 Parts = Packed[tuple[Model, Solver, Forces, StepMemory]]
 
@@ -42,16 +43,16 @@ class Stepper:
         blocks, lines = self.work.blocks, self.work.lines
         blocks[:] = lines[:] = np.nan  # what is not written must not be read
         write_matrix(self.parts, modes, time)
-        return written_out(blocks, self.solver)
+        return written_out(blocks, self.solver.schedule)
 
 
-def written_out(blocks: np.ndarray, solver: Solver) -> np.ndarray:
+def written_out(blocks: np.ndarray, schedule: Schedule) -> np.ndarray:
     """A symmetric matrix (6 bodies, 6 bodies) from its blocks."""
-    bodies = len(solver.schedule.first) - 1
+    bodies = len(schedule.first) - 1
     matrix = np.zeros((bodies, bodies, 6, 6))
     for body in range(bodies):
         matrix[body, body] = blocks[body]
-    for pair, block in solver.schedule.blocks.items():
+    for pair, block in schedule.blocks.items():
         matrix[pair], matrix[pair[::-1]] = blocks[block], blocks[block].T
     upper = np.triu(matrix.swapaxes(1, 2).reshape(6 * bodies, 6 * bodies))
     return upper + np.triu(upper, 1).T

@@ -43,7 +43,7 @@ from tetra_drake.laws.actuator import Winch
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.laws.contact import MODE_COLUMNS, GroundSection, NormalForce
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.laws.terrain import Flat
+from tetra_drake.laws.terrain import Flat, Grid, Relief
 from tetra_drake.robot.command import Command, controlled_robot, driven_robot
 from tetra_drake.robot.ground import make_surface
 from tetra_drake.robot.robot import Robot
@@ -82,6 +82,16 @@ def answered(answer: Any = None, bounds: tuple[float, float] = (0.0, 1.0)):
     Given.answer, Given.bounds = answer, bounds
     chosen = brief("prism", {}).with_sections(policy=Given())
     simulate(chosen, td.seeded_gait(chosen))
+
+
+def gridded(heights: Any, cell: tuple[float, float] = (1.0, 1.0)):
+    """A robot on a terrain of a plug-in that has these heights."""
+
+    class Odd(Relief):
+        def grid(self, **_: Any) -> Grid:
+            return Grid(heights, (-1.0, -1.0), cell)
+
+    Robot.of(scenario("prism").with_sections(terrain=Odd()))
 
 
 def steered(steering: Any):
@@ -248,15 +258,11 @@ def diagram(parameters: bool):
 def put(name: str, constants: Any, *, into: str = "", parameters: bool = True):
     """Gives a system constants, in its context or in that of another system; "root" and "none"."""
     own = diagram(parameters)
-    root, system = own.CreateDefaultContext(), own.GetSubsystemByName(name)
-    place = into or name
-    contexts = {"none": None, "root": root}
-    context = (
-        contexts[place]
-        if place in contexts
-        else own.GetSubsystemByName(place).GetMyMutableContextFromRoot(root)
-    )
-    (system.SetLaw if name == "cables" else system.SetGround)(context, constants)
+    root = own.CreateDefaultContext()
+    parts: dict[str, Any] = {"none": None, "root": root}
+    cables, ground = (own.GetSubsystemByName(part) for part in ("cables", "ground"))
+    parts |= {part.get_name(): part.GetMyMutableContextFromRoot(root) for part in (cables, ground)}
+    (cables.SetLaw if name == "cables" else ground.SetGround)(parts[into or name], constants)
 
 
 def with_controller(inputs: dict[str, int], outputs: dict[str, int]):

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tetra_drake.kernels.packed import Packed
-from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
-from tetra_drake.laws.forces import Forces, add_ground_forces, move_contacts
+from tetra_drake.laws.contact import MODE_COLUMNS
+from tetra_drake.laws.forces import Forces, move_contacts
 from tetra_drake.laws.mode_change import modes_after_step, time_to_mode_change
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
@@ -32,39 +32,27 @@ class RobotOnGround:
         state[35:].reshape(5, 6)[:, 3:] = self.R @ v
         return state
 
-    def meet(self, state: np.ndarray) -> Forces:
-        """The nodes and frames of a state."""
-        forces = Forces.of(self.model)
-        move_contacts(self.model, state, forces)
-        return forces
-
     def update_at(self, state: np.ndarray) -> bool:
         """Updates the modes. Returns True if they changed."""
-        forces = self.meet(state)
-        return update_modes(state, forces.nodes, self.model.ground, forces.frames, self.modes)
+        parts = Packed((self.model, Forces.of(self.model)))
+        return bool(modes_after_step(parts, state, self.modes))
 
     def update(self, v=REST, p=TOUCHING) -> bool:
         return self.update_at(self.state(v, p))
 
-    def forces(self, v=REST, p=TOUCHING) -> tuple[np.ndarray, np.ndarray]:
-        """The nodes with the forces on them, and the `ground_forces`."""
-        state = self.state(v, p)
-        forces = self.meet(state)
-        forces.ground_forces[:] = np.nan
-        add_ground_forces(self.model, state, self.modes, True, forces)
-        return forces.nodes, forces.ground_forces
-
     def time_to_change(self, v=REST, a=REST, p=TOUCHING) -> float:
         """Time (s) until the next mode change at an acceleration a (m/s²), at most 9 s."""
-        state = self.state(v, p)
+        state, forces = self.state(v, p), Forces.of(self.model)
         acceleration = np.tile([0.0, 0.0, 0.0, *(self.R @ a)], 5)
-        forces = self.meet(state)
+        move_contacts(self.model, state, forces)
         return time_to_mode_change(self.model, state, acceleration, self.modes, forces, 9.0)
 
     def is_due_at(self, state: np.ndarray) -> bool:
         """True if a mode changes at once when a step ends here."""
-        parts = Packed((self.model, Forces.of(self.model)))
-        return bool(modes_after_step(parts, state, self.modes.copy()))
+        kept = self.modes.copy()
+        due = self.update_at(state)
+        self.modes[:] = kept
+        return due
 
     def is_due(self, v=REST, p=TOUCHING) -> bool:
         return self.is_due_at(self.state(v, p))

@@ -11,17 +11,13 @@ from pathlib import Path
 
 import numba
 import pytest
+import yaml
 
 import tetra_drake
 from tetra_drake.kernels import compiling
 from tetra_drake.kernels.compiling import LOGGER, compiled, compiling_time
 
-PROGRAM = """
-import numpy as np
-from tetra_drake.laws.kinematics import interpolate_state
-state = np.eye(1, 13)[0]
-print(interpolate_state(state, state, 0.1, 1.0)[0])
-"""
+PROGRAMS = yaml.safe_load(Path(__file__).with_name("programs.yaml").read_text("utf-8"))
 
 
 @pytest.fixture
@@ -34,37 +30,25 @@ def package(tmp_path: Path) -> Path:
     return target.parent
 
 
-def run(package: Path, cache_home: Path, program: str = PROGRAM) -> str:
-    """What the program prints."""
+def run(package: Path, cache_home: Path, program: str) -> str:
+    """What a program of programs.yaml prints."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
     environment |= {"PYTHONPATH": str(package)}
     environment |= {"XDG_CACHE_HOME": str(cache_home), "HOME": str(cache_home)}
-    command = [sys.executable, "-c", program]
+    command = [sys.executable, "-c", PROGRAMS[program]]
     return subprocess.check_output(command, env=environment, cwd=package, text=True)
 
 
 @pytest.mark.parametrize(("folder", "caches"), [("cache", True), ("file/cache", False)])
 def test_a_read_only_installation_caches_for_the_user_if_it_can(package, tmp_path, folder, caches):
     (tmp_path / "file").write_text("")
-    assert float(run(package, tmp_path / folder)) == 1.0
+    assert float(run(package, tmp_path / folder, "interpolate")) == 1.0
     assert any(tmp_path.rglob("kinematics.interpolate_state*.nbc")) == caches
-
-
-STAMPS = """
-import sys
-import tetra_drake.engines.lanes.places, tetra_drake.engines.observer, tetra_drake.robot.equilibrium
-import tetra_drake.systems.ground_contact, tetra_drake.systems.cable_network
-from tetra_drake.kernels.stamp import stamp
-for module in [module for name, module in sys.modules.items() if "tetra_drake" in name]:
-    for name, value in vars(module).items():
-        if hasattr(value, "targetoptions") and value.__module__ == module.__name__:
-            print(name, stamp(value.py_func))
-"""
 
 
 def stamps(package: Path, home: Path) -> dict[str, str]:
     """The digest by which the machine code of each kernel of a copy of the package is known."""
-    printed = run(package, home, STAMPS)
+    printed = run(package, home, "stamps")
     return dict(line.split() for line in printed.splitlines())
 
 

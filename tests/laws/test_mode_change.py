@@ -6,26 +6,12 @@ from helpers.robot_on_ground import RobotOnGround
 from scipy.spatial.transform import Rotation
 
 from tetra_drake.laws.contact import HEADING, MODE
-from tetra_drake.laws.friction import Coulomb, ResetConstants, first_zero
+from tetra_drake.laws.friction import Coulomb, ResetConstants
 from tetra_drake.laws.terrain import Flat, Incline
 from tetra_drake.scenario.scenario import Scenario
 
 SLOPE = 0.2
 R = np.array([[np.cos(SLOPE), 0, -np.sin(SLOPE)], [0, 1, 0], [np.sin(SLOPE), 0, np.cos(SLOPE)]])
-
-
-ZEROS = [(1.0, -2.0, 0.0, 0.5)]  # 1 - 2 t
-ZEROS += [(1.0, 0.0, -50.0, 0.2)]  # 1 - 25 t^2
-ZEROS += [(1.0, -3.0, 4.0, 0.5)]  # 1 - 3 t + 2 t^2 = (1 - t)(1 - 2 t)
-ZEROS += [(1.0, 3.0, 4.0, 9.0)]  # both roots in the past
-ZEROS += [(1.0, -1.0, 4.0, 9.0)]  # turns before zero
-ZEROS += [(0.0, -1.0, 0.0, 9.0)]  # is there already: the mode changes now, not later
-ZEROS += [(1.0, -0.01, 0.0, 9.0)]  # beyond the horizon
-
-
-@pytest.mark.parametrize(("value", "rate", "rate_rate", "expected"), ZEROS)
-def test_first_zero_of_a_quadratic(value, rate, rate_rate, expected):
-    assert first_zero(value, rate, rate_rate, 9.0) == pytest.approx(expected, rel=1e-14)
 
 
 # The reset integrator, on flat ground.

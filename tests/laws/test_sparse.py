@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.kernels import written_out
 
 from tetra_drake.laws.sparse import BLOCK, Schedule, factorise, solve
 
@@ -19,36 +20,16 @@ GRAPHS = {
 }
 
 
-def random_matrix(bodies: int, pairs: list[tuple[int, int]]) -> np.ndarray:
-    """A random positive definite matrix, in which the pairs of bodies are coupled."""
-    generator = np.random.default_rng(bodies)
-    matrix = 0.1 * np.eye(BLOCK * bodies)
-    for body_a, body_b in [*pairs, *((body, body) for body in range(bodies))]:
-        for _ in range(6):
-            vector = np.zeros((bodies, BLOCK))
-            vector[body_a], vector[body_b] = generator.normal(size=(2, BLOCK))
-            matrix += generator.uniform(0.1, 2.0) * np.outer(vector, vector)
-    return matrix
-
-
-def blocks_of(matrix: np.ndarray, schedule: Schedule) -> np.ndarray:
-    """The matrix as blocks; NaN below the diagonal, which nothing may read."""
-    written_out = matrix.reshape(len(matrix) // BLOCK, BLOCK, -1, BLOCK).swapaxes(1, 2)
-    blocks = np.empty((len(schedule.later), BLOCK, BLOCK))
-    for body in range(len(written_out)):
-        blocks[body] = written_out[body, body]
-        blocks[body][np.tril_indices(BLOCK, -1)] = np.nan
-    for pair, block in schedule.blocks.items():
-        blocks[block] = written_out[pair]
-    return blocks
-
-
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_solves_what_it_was_made_of(graph):
     bodies, pairs = GRAPHS[graph]
-    matrix, schedule = random_matrix(bodies, pairs), Schedule.of(bodies, pairs)
-    right_side = np.random.default_rng(1).normal(size=BLOCK * bodies)
-    blocks, x = blocks_of(matrix, schedule), right_side.copy()
+    random, schedule = np.random.default_rng(bodies), Schedule.of(bodies, pairs)
+    blocks = random.normal(size=(len(schedule.later), BLOCK, BLOCK))
+    blocks[:bodies] += 20.0 * bodies * np.eye(BLOCK)  # positive definite
+    rows, columns = np.tril_indices(BLOCK, -1)
+    blocks[:bodies, rows, columns] = np.nan  # which nothing may read
+    matrix, right_side = written_out(blocks, schedule), random.normal(size=BLOCK * bodies)
+    x = right_side.copy()
     factorise(blocks, schedule)
     solve(blocks, schedule, x)
     np.testing.assert_allclose(x, np.linalg.solve(matrix, right_side), rtol=1e-9, atol=1e-12)

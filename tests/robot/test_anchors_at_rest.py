@@ -5,13 +5,11 @@ import math
 import numpy as np
 import pytest
 from helpers.anchored import HUNG, SWINGING, scenario_of, supported_prism
-from helpers.joined import DOUBLE, RHOMBUS
 
 from tetra_drake.lab.study.equilibrium import structure_text, study_equilibrium
 from tetra_drake.robot.remarks import yielding_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.robot_structure import StructureFile
 
 G = 9.80665
 TENSION, SIZE, SPREAD = 2e4, 10.0, 6.0
@@ -85,17 +83,6 @@ def test_a_foot_that_gives_way_by_a_twentieth_of_the_guys_stretch_is_told():
     assert "anchors.foot" in told
     assert f"{foot[robot.structure.node_names.index('foot'), 2]:.4g} m" in told
     assert told[1:] in structure_text(study_equilibrium(robot))
-
-
-def test_joints_and_pins_without_a_stiffness_of_their_own_have_the_key_or_follow_the_robot():
-    def stiffness(**changes: object) -> list[float]:
-        return StructureFile.model_validate(RHOMBUS | changes).blueprint().joint_stiffness.tolist()
-
-    assert stiffness() == pytest.approx([1e3 * (1e3 + 1e3)] * 4)
-    assert stiffness(joint_stiffness=3e4) == [3e4] * 4
-    knee = {"knee": {"nodes": ["b", "c"], "stiffness": 5e4}}
-    blueprint = StructureFile.model_validate(DOUBLE | {"joints": knee, "joint_stiffness": 3e4})
-    assert blueprint.blueprint().joint_stiffness == [5e4]
 
 
 def test_without_cables_the_weight_moves_an_anchor_by_a_hundredth_of_a_millimetre_per_metre():

@@ -1,11 +1,11 @@
 """Every scenario that loads makes a robot, or ends in one line."""
 
-import functools
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from helpers.anchored import load_once
 from helpers.laws import EXAMPLES
 
 from tetra_drake.errors import InputError
@@ -34,9 +34,6 @@ def text_of(name, generator):
     factors *= generator.choice([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0], len(some))
     changed = {key: float(numbers[key] * factor) for key, factor in zip(some, factors, strict=True)}
     return dump_scenario(scenario.with_numbers(changed))
-
-
-load_once = functools.cache(load_scenario)
 
 
 @pytest.mark.parametrize("draws", [8, pytest.param(50, marks=pytest.mark.slow)])

@@ -94,12 +94,9 @@ SPACES = {"thesis": {}, "turning": {}, "feedback": {"gait_bounds.independent_tau
 """Shipped scenarios, with changes."""
 
 
-@pytest.fixture(params=SPACES)
-def shipped(request):
-    return load_scenario(request.param).with_changes(SPACES[request.param])
-
-
-def test_a_saved_gait_of_any_scenario_loads_back(tmp_path, shipped):
+@pytest.mark.parametrize("name", SPACES)
+def test_a_saved_gait_of_any_scenario_loads_back(tmp_path, name):
+    shipped = load_scenario(name).with_changes(SPACES[name])
     gait = seeded_gait(shipped, 5)
     for name in shipped.cpg.feedback:
         assert gait.parameters[f"gain {name}"] != 0.0

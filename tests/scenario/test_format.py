@@ -32,6 +32,8 @@ def test_the_example_has_what_its_page_says() -> None:
     assert pairs == [["low", "eye"], ["mid", "mid-2"]]
     # The sling and two guys of 500 N/m.
     assert blueprint.joint_stiffness.tolist() == pytest.approx([1e5, 1e3 * 3 * 500.0])
+    given = structure_of("crane", "joint_stiffness: 3 kN/m").blueprint()
+    assert given.joint_stiffness.tolist() == [1e5, 3e3]
     assert blueprint.joint_damping == pytest.approx(1e-3 * blueprint.joint_stiffness)
     assert blueprint.anchor_stiffness[names.index("top")] == pytest.approx([1.5e6] * 3)
     [(body, given)] = blueprint.given_inertia.items()

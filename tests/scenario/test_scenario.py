@@ -1,10 +1,10 @@
 """Scenario files: the thesis's numbers, files based on files, dumping, and differences."""
 
-import functools
 from pathlib import Path
 
 import pytest
 import yaml
+from helpers.anchored import load_once
 from record import EXPERIMENTS
 
 from tetra_drake.robot.remarks import start_up_remark
@@ -31,7 +31,6 @@ def test_the_thesis_scenario_holds_the_numbers_of_the_thesis(scenario):
     assert scenario.disturbances is None
 
 
-load_once = functools.cache(load_scenario)
 RUNS = Path(__file__).parents[2] / "runs"
 
 

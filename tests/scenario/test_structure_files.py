@@ -4,27 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.files import SMALL
+from helpers.files import SMALL, structure_of
 from pytest import approx
 
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_structures
 from tetra_drake.scenario.structure_files import read_structure
-
-
-def load(folder: Path, robot: str, *, more: str = "") -> Scenario:
-    """The scenario mine.yaml, on the thesis's."""
-    text = f"base: thesis\nname: mine\nobjective: {{speed: 1 s/m}}\nrobot: {robot}\n{more}\n"
-    (folder / "mine.yaml").write_text(text)
-    return load_scenario(folder / "mine.yaml")
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """A folder with a structure file, own.yaml."""
-    (tmp_path / "own.yaml").write_text(SMALL)
-    return tmp_path
 
 
 @pytest.mark.parametrize("name", shipped_structures())
@@ -32,18 +17,18 @@ def test_a_shipped_scenario_has_the_shipped_structure(name: str) -> None:
     assert load_scenario(name).robot == read_structure(name)
 
 
-def test_another_file_replaces_the_structure_of_the_base(folder: Path) -> None:
+def test_another_file_replaces_the_structure_of_the_base(tmp_path: Path) -> None:
     text = "base: prism\nname: other\nrobot: {file: mine/own.yaml, gravity: 0}\n"
-    (folder / "mine").mkdir()
-    (folder / "own.yaml").rename(folder / "mine" / "own.yaml")
-    (folder / "other.yaml").write_text(text)
-    given = load_scenario(folder / "other.yaml").robot
-    expected = read_structure(folder / "mine" / "own.yaml")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "own.yaml").write_text(SMALL)
+    (tmp_path / "other.yaml").write_text(text)
+    given = load_scenario(tmp_path / "other.yaml").robot
+    expected = read_structure(tmp_path / "mine" / "own.yaml")
     assert given == expected.model_copy(update={"gravity": 0.0})
 
 
-def test_numbers_of_groups_have_dotted_keys(folder: Path) -> None:
-    scenario = load(folder, "!Structure {file: own.yaml}")
+def test_numbers_of_groups_have_dotted_keys() -> None:
+    scenario = load_scenario("prism").with_sections(robot=structure_of("small"))
     assert scenario.numbers()["robot.struts.arm.density"] == approx(1200.0)
     changed = scenario.with_numbers({"robot.cables.long.tension": 4.0, "robot.masses.g": 1.0})
     assert changed.robot.masses == {"g": 1.0}

@@ -1,7 +1,6 @@
 """Terrains: the grids they become, the surfaces drawn from those, and what is refused."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,14 +11,12 @@ from tetra_drake.laws.height_field import HeightField
 from tetra_drake.laws.terrain import (
     Grid,
     Obstacles,
-    Relief,
     Rough,
     Steps,
     SurfaceGrid,
     Terrain,
     surface,
 )
-from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -209,18 +206,3 @@ def test_a_saved_field_does_not_need_the_file_it_was_read_from(tmp_path, damage,
     copy.unlink() if damage == "gone" else write_heights(copy, 2.0 * HEIGHTS)
     with refused(moved / SCENARIO, "terrain.file", copy.name):
         load_scenario(moved / SCENARIO)
-
-
-GRIDS = [(Grid(np.full((3, 3), np.nan), (-1.0, -1.0), (1.0, 1.0)), "nan in row 1")]
-GRIDS += [(Grid(np.zeros(9), (-1.0, -1.0), (1.0, 1.0)), "9 heights")]
-GRIDS += [(Grid(np.zeros((3, 3)), (-1.0, -1.0), (0.0, 1.0)), "cells of (0.0, 1.0) m")]
-
-
-@pytest.mark.parametrize(("grid", "fact"), GRIDS)
-def test_the_grid_of_a_kind_is_held_to_what_a_height_file_is(grid, fact, refused):
-    class Odd(Relief):
-        def grid(self, **_: Any) -> Grid:
-            return grid
-
-    with refused("!Odd", "grid", fact):
-        Robot.of(load_scenario("prism").with_sections(terrain=Odd()))

@@ -146,6 +146,18 @@ class Manifest:
         seed = (self.seed, trial, iteration) if draws else None
         return Task(vector, trial, index, iteration, seed)
 
+    def check_made_with(self, directory: Path, **given: Any) -> None:
+        """Raises InputError, naming the run's `directory`, if the run was made with another `seed`,
+        `objective` or `optimizer` than `given`; None is any."""
+        for part, value in given.items():
+            recorded = (vars(self) | vars(self.method))[part]
+            if value not in (None, recorded):
+                problem = f"the run was made with {recorded}, not {value}"
+                if part in self.method.given_from_python:
+                    call = f"tetra_drake.evolve(None, {str(directory)!r}, resume=True, {part}=...)"
+                    problem += f"; resume it from Python: {call}"
+                raise InputError(directory, part, problem)
+
     @property
     def digest(self) -> str:
         """SHA-256 of the manifest without its scenario, which has a digest of its own."""
@@ -268,22 +280,11 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
         manifest = read_manifest(directory)
         if manifest.thinned:
             raise InputError(directory, "", "is thinned: it lacks genomes that resuming needs")
-        if seed not in (None, manifest.seed):
-            raise InputError(directory, "seed", f"the run has seed {manifest.seed}, not {seed}")
         if scenario is not None:
             for key, value in manifest.scenario.differences(scenario):
                 problem = f"the run has {value}; it is resumed with its own scenario"
                 raise InputError(directory, key, problem)
-        ours = manifest.method
-        for part, given in vars(method or ours).items():
-            recorded = vars(ours)[part]
-            if given == recorded:
-                continue
-            problem = f"the run was made with {recorded}, not {given}"
-            if part in ours.given_from_python:
-                call = f"tetra_drake.evolve(None, {str(directory)!r}, resume=True, {part}=...)"
-                problem += f"; resume it from Python: {call}"
-            raise InputError(directory, part, problem)
+        manifest.check_made_with(directory, seed=seed, **vars(method or manifest.method))
         return cls(directory, manifest, begun=True, _lock=_locked(directory))
 
     def begin(self) -> None:

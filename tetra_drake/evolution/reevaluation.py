@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import REEVALUATIONS, EvaluationLine
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.evaluators import MakeExecutor, evaluate_all, evaluator_of
@@ -47,10 +46,8 @@ def reevaluate(
     """
     run = load_run(directory)
     manifest, scenario = run.manifest, run.scenario
-    recorded, given = manifest.method.objective, Method.of(scenario, objective=objective).objective
-    if given != recorded:
-        problem = f"the run was made with {recorded}, not {given}"
-        raise InputError(run.directory, "objective", problem)
+    given = Method.of(scenario, objective=objective).objective
+    manifest.check_made_with(run.directory, objective=given)
     files = [run.file(REEVALUATIONS, trial) for trial in range(scenario.evolution.trials)]
     for file in files:
         file.repair()

@@ -30,7 +30,8 @@ from tetra_drake.evolution.entries import (
 from tetra_drake.evolution.manifest import MANIFEST, Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path
-from tetra_drake.formatting import Say, TextTable, heading_html, rounded, silent
+from tetra_drake.formatting import Say, heading_html, silent
+from tetra_drake.on_demand import loaded
 from tetra_drake.results.result import headline
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.gait_file import load_gait
@@ -97,13 +98,10 @@ class Run:
         return f"<Run {self.directory}>"
 
     def _repr_html_(self) -> str:
-        rows, units, gaits = [], self.scenario.units, self.best().set_index("trial")
-        for trial in self.statuses:
-            distance = units.shown(trial.best_distance, "m") if trial.number in gaits.index else "-"
-            counts = [str(trial.number), str(trial.evaluations), rounded(trial.best_fitness)]
-            rows.append([*counts, distance, trial.stop or "not finished"])
-        headings = ["trial", "evaluations", "best fitness", "distance", "end"]
-        return heading_html(str(self)) + TextTable(headings, rows, (0, 4)).html()
+        if self.best().empty:
+            return heading_html(str(self))
+        trials_table = loaded("tetra_drake.report.summary:trials_table")
+        return heading_html(str(self)) + trials_table(self).html()
 
     @property
     def scenario(self) -> Scenario:

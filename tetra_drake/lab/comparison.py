@@ -36,7 +36,7 @@ from tetra_drake.figures.style import (
     page_width,
     titled,
 )
-from tetra_drake.formatting import TextTable, fixed, ranged, rounded
+from tetra_drake.formatting import TextTable, fixed, ranged, render, rounded
 from tetra_drake.lab.page import save_findings
 from tetra_drake.lab.study.statistics import (
     interquartile_mean,
@@ -351,14 +351,10 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
 def comparison_text(compared: Compared) -> str:
     """Text for the terminal: tables of the fitnesses and distances of compared runs."""
     units, reach = compared.scenario.units, compared.reach
-    distance = f"Distance in {units.length_word} of the best gait of each trial, also as "
-    distance += "interquartile mean."
     fitness_headings = ["run", "trials", "simulations", f"after {compared.common}", "at the end"]
     distance_headings = ["run", "distance", "s per evaluation"]
-    if reach is not None:
-        shown = units.shown(reach, "m")
-        distance += f"\nSimulations until a trial's best gait goes {shown}: "
-        distance += "median (quartiles) over trials."
+    shown = "" if reach is None else units.shown(reach, "m")
+    if shown:
         distance_headings += [f"simulations to {shown}", "trials that reach it"]
     fitnesses, distances = [], []
     for label, row in compared.runs.iterrows():
@@ -367,23 +363,21 @@ def comparison_text(compared: Compared) -> str:
         fitnesses.append([str(label), f"{row['trials']:.0f}", f"{row['cost']:.0f}", common, end])
         lengths = row[["distance_mean", "distance_low", "distance_high"]] / units.length
         cells = [str(label), ranged(*lengths), rounded(row["wall_time"], 2)]
-        if reach is not None:
+        if shown:
             costs = row[["reached", "reached_low", "reached_high"]]
             median, low, high = (f"{x:.0f}" if math.isfinite(x) else "never" for x in costs)
             of = f"{row['share'] * row['trials']:.0f} of {row['trials']:.0f}"
             cells += [f"{median} ({low} to {high})", of]
         distances.append(cells)
-    texts = [
-        f"Best fitness of each trial after {compared.common} simulations, where the first run "
-        "ends, and at its end:\ninterquartile mean over trials (95 % confidence interval). A run "
-        "ends with its longest trial,\nor with the first unfinished one. Simulations: median over "
-        "trials.",
-        TextTable(fitness_headings, fitnesses).text(),
-        *([] if compared.improvement.empty else [improvement_text(compared.improvement)]),
-        distance,
-        TextTable(distance_headings, distances).text(),
-    ]
-    return "\n\n".join(texts + [f"note: {note}" for note in compared.notes])
+    return render(
+        "lab/comparison.txt.jinja",
+        compared=compared,
+        units=units,
+        fitnesses=TextTable(fitness_headings, fitnesses),
+        improvement=improvement_text(compared.improvement),
+        reach=shown,
+        distances=TextTable(distance_headings, distances),
+    )
 
 
 def improvement_text(improvement: pandas.DataFrame) -> str:

@@ -4,9 +4,11 @@ import dataclasses
 import threading
 import time
 from concurrent.futures import CancelledError
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from helpers.actuations import SIDES
 from helpers.anchored import HUNG, scenario_of
 from helpers.brief import BRIEF
@@ -16,16 +18,9 @@ from tetra_drake.engines.lanes.batch import LaneBatch, processor_lanes
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import (
-    Diverged,
-    StepBudgetExceeded,
     TimeBudgetExceeded,
 )
-from tetra_drake.laws.actuator import TensionMotor, Winch
-from tetra_drake.laws.capsules import HuntCrossley
 from tetra_drake.laws.feedback import PATHWAYS
-from tetra_drake.laws.friction import Coulomb
-from tetra_drake.laws.terrain import Rough
-from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
@@ -34,35 +29,11 @@ from tetra_drake.scenario.experiment_sections import Disturbances
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
-FAR_TOO_STRONG = {"cpg.gain": "4e9 N"}
-"""A pull that throws the robot about at the first step."""
-
-TOO_STRONG = {"cpg.gain": "300.0 N", "simulation.max_evaluations": 20_000}
-"""One that winds it up until steps are tiny."""
-
-ROUGH = {"robot.contacts": "all", "friction": Coulomb()}
-ROUGH |= {"terrain": Rough(amplitude=2e-3, wavelength=0.1)}
-FINER = ROUGH | {"terrain": Rough(amplitude=3e-3, wavelength=0.05, seed=1)}
-FINER |= {"friction": Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)}
-TOUCHING = {"strut_contact": HuntCrossley(stiffness=1e4, dissipation=1.0)}
-TOUCHING |= {"robot.strut_diameter": "13 mm", "cpg.gain": "10 lbf"}
-SOFT = TOUCHING | {"strut_contact": HuntCrossley(stiffness=3e3, dissipation=0.0)}
-THINNER = TOUCHING | {"robot.strut_diameter": "12 mm"}
-LIMITS = [(70.0, 0.5, 0.02), (5.0, 0.1, 0.1), (4.0, 0.3, 0.5e-3)]
-"""Force (N), speed (m/s) and time constant (s) of actuators."""
-
-GOES, FAILS, ENDS = SimulationResult, Diverged, StepBudgetExceeded
-NEIGHBOURS = {
-    "strength": [({}, GOES), (FAR_TOO_STRONG, FAILS), ({}, GOES), (TOO_STRONG, ENDS)],
-    # They touch, each by a law of its own.
-    "struts": [(THINNER, GOES), (TOUCHING, GOES), (SOFT, GOES)],
-    # Each lane has a grid of its own size, and constants of its own.
-    "ground": [(FINER, GOES), (ROUGH, GOES), (ROUGH | FAR_TOO_STRONG, FAILS)],
-}
-for kind in (Winch, TensionMotor):
-    actuators = (kind(max_force=f, max_speed=v, time_constant=tau) for f, v, tau in LIMITS)
-    NEIGHBOURS[kind.__name__] = [({"actuation": each}, GOES) for each in actuators]
-"""Changes of scenarios that walk side by side, and how they end."""
+BESIDE, APART = yaml.safe_load(
+    Path(__file__).with_name("neighbours.yaml").read_text("utf-8")
+).values()
+"""Changes of scenarios, by groups with the ends of walks, and of robots that may need a batch of
+their own."""
 
 
 @pytest.fixture
@@ -72,14 +43,14 @@ def short(scenario: Scenario) -> Scenario:
     return scenario.with_changes({"engine": "!Compiled", "cpg.start_up": "0.2 s", **times})
 
 
-@pytest.mark.parametrize("name", NEIGHBOURS)
+@pytest.mark.parametrize("name", BESIDE)
 def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, name):
-    changes, kinds = zip(*NEIGHBOURS[name], strict=True)
+    changes, ends = zip(*BESIDE[name], strict=True)
     scenarios = [short.with_changes(changes[i % len(changes)]) for i in range(11)]
     gaits = [seeded_gait(scenario, seed) for seed, scenario in enumerate(scenarios)]
     walks = [*zip(scenarios, gaits, strict=True)]
     alone = [simulate_many([scenario], [gait], record=True)[0] for scenario, gait in walks]
-    assert tuple(map(type, alone[: len(changes)])) == kinds
+    assert [type(each).__name__ for each in alone[: len(changes)]] == [*ends]
     assert len({repr(getattr(each, "metrics", each)) for each in alone}) == 11, "all of them differ"
     for step in (1, -1):
         found = simulate_many(scenarios[::step], gaits[::step], record=True, workers=1)
@@ -87,25 +58,10 @@ def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short
             assert_same(ours, theirs)
 
 
-LOSSES = [{"at": "0.2 s", "cut": ["T1-T2 outer top"]}, {"at": "0.2 s", "lose": ["T2", "T5"]}]
-
-
 def scenarios_of_their_own(short: Scenario) -> list[Scenario]:
     """Rows of tetrahedra and structures, some of which walk side by side."""
     senses = SIDES | {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)}
-    changes = [
-        {},
-        {"robot.cables.outer_stiffness": "0.21 lbf/in"},
-        {"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]},
-        {"simulation.duration": "0.8 s", "engine.tolerance": "5e-5 m/s"},
-        {"robot.tetrahedra": 3},
-        senses,
-        senses | {"cpg.gain": "1 lbf"},
-        {"robot.cables.slack": True, "cpg.listing_step": "0.1 ms"},
-        {"robot.gravity": "1.6 m/s^2", "ground.stiffness": "20 lbf/in"},
-        {"engine": "!Drake", "robot.tetrahedra": 2},
-        *({"events": events, "robot.payload": ["9 g"] * 5} for events in ([], LOSSES)),
-    ]
+    changes = [*APART, senses, senses | {"cpg.gain": "1 lbf"}]
     scenarios = [short.with_changes(each) for each in changes]
     hung = scenario_of(HUNG | {"loads": {"b": [0.1, 0.0, 0.0]}}, duration=1.0)
     for force, x in ((0.1, 0.0), (0.2, 0.001)):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import llvmlite.binding
 import pytest
+import yaml
 
 from tetra_drake.machine import LEVELS
 
@@ -15,18 +16,7 @@ HERE = {f"+{name}" for name, has in llvmlite.binding.get_host_cpu_features().ite
 WITHOUT_AVX512 = {"NPY_DISABLE_CPU_FEATURES": "X86_V4", "OPENBLAS_CORETYPE": "Haswell"}
 """Lets NumPy and its BLAS compute as on a processor of the level v3."""
 
-WALKS = """
-from tetra_drake.engines.simulate import simulate
-from tetra_drake.robot.parameter_space import seeded_gait
-from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.shipped import shipped_scenarios
-for name in shipped_scenarios():
-    for engine in ("!Compiled", "!Drake") if name in ("thesis", "motors") else ("!Compiled",):
-        changes = {"engine": engine, "simulation.duration": "4 s", "simulation.steady_from": "3 s"}
-        scenario = load_scenario(name).with_changes(changes)
-        metrics = simulate(scenario, seeded_gait(scenario)).metrics
-        print(name, engine, metrics.distance_in.hex(), metrics.actuator_work.hex())
-"""
+WALKS = yaml.safe_load(Path(__file__).with_name("programs.yaml").read_text("utf-8"))["walks"]
 
 
 def run(command: list[str], cache: Path, **environment: str) -> str:

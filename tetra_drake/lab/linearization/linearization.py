@@ -15,6 +15,7 @@ from scipy import linalg
 from scipy.spatial.transform import Rotation
 
 from tetra_drake.errors import InputError, check_type, checked_numbers
+from tetra_drake.lab.differences import derivatives
 from tetra_drake.lab.linearization.rates import rates_and_forces
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import MODE_COLUMNS
@@ -294,11 +295,7 @@ def _matrices(
     of_bodies = np.tile(np.repeat([1.0, radius], 3), 2 * bodies)
     of_drives = np.full(drives.size, np.abs(drives).max(initial=0.0) or 1.0)
     scales = np.concatenate([of_bodies, of_drives, np.full(signals.size, of_signals)])
-    columns = []
-    for step in STEP * np.diag(scales):
-        change = rates_and_outputs(step) - rates_and_outputs(-step)
-        columns.append(change / (2.0 * step.max()))
-    jacobian, size = np.transpose(columns), ends[-1]
+    jacobian, size = derivatives(rates_and_outputs, STEP * scales), ends[-1]
     of_states, of_inputs = jacobian[:, :size], jacobian[:, size:]
     return of_states[:size], of_inputs[:size], of_states[size:], of_inputs[size:]
 

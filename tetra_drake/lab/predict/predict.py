@@ -40,7 +40,6 @@ from tetra_drake.lab.predict.variates import Variate, variates_of
 from tetra_drake.lab.study.equilibrium import EquilibriumStudy, study_equilibrium
 from tetra_drake.lab.study.statistics import json_rows
 from tetra_drake.machine import threads_for
-from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, Driver
 from tetra_drake.robot.gait_file import GivenGait, given_gait
 from tetra_drake.robot.parameter_space import with_body
@@ -327,7 +326,7 @@ def _measured(
     scenario: Scenario, outcome: Outcome | InputError | None, measures: Mapping[str, Measure]
 ) -> list[float] | Exception:
     """Values of the measures for a scenario and the outcome of its simulation, None for a robot at
-    rest; or why there are none."""
+    rest, NaN if not finite; or why there are none, such as an unknown name."""
     if isinstance(outcome, Exception):
         return outcome
     names = {each for each in measures.values() if isinstance(each, str)}
@@ -338,27 +337,18 @@ def _measured(
             study = study_equilibrium(Robot.of(scenario, at_rest=True))
         if study and names:
             known |= values_at_rest(study)
-        values = [_value(outcome or study, known, each) for each in measures.values()]
+        for name in names - known.keys():
+            if not re.fullmatch(r"frequency [1-9]\d*", name):
+                what = "needs a gait or a command" if name in METRICS else "is unknown"
+                raise InputError("predict", f"quantities.{name}", f"{what}; {hint(name, known)}")
+            known[name] = math.nan  # the robot has fewer frequencies
+        values = [
+            known[each] if isinstance(each, str) else float(each(outcome or study))
+            for each in measures.values()
+        ]
     except (InputError, SimulationFailure) as error:
         return error
     return [value if math.isfinite(value) else math.nan for value in values]
-
-
-def _value(
-    outcome: EquilibriumStudy | SimulationResult | None,
-    known: Mapping[str, float],
-    measure: Measure,
-) -> float:
-    """Value of a measure in SI. `known` are the numbers of the outcome by name. Raises InputError
-    for an unknown name."""
-    if not isinstance(measure, str):
-        return float(measure(outcome))
-    if measure not in known:
-        if re.fullmatch(r"frequency [1-9]\d*", measure):
-            return math.nan
-        what = "needs a gait or a command" if measure in METRICS else "is unknown"
-        raise InputError("predict", f"quantities.{measure}", f"{what}; {hint(measure, known)}")
-    return float(known[measure])
 
 
 def values_at_rest(study: EquilibriumStudy) -> dict[str, float]:

@@ -18,8 +18,9 @@ import pandas
 from scipy import linalg
 
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
+from tetra_drake.formatting import TextTable, fixed, listed, render, rounded, sentence
 from tetra_drake.lab.bridges.formats import format_of
+from tetra_drake.lab.differences import derivatives
 from tetra_drake.lab.study.statics import Statics, find_statics
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.cable import TENSION
@@ -250,54 +251,44 @@ def _at_rest(given: Scenario, source: str, *, within: str = "") -> Robot:
 def structure_text(study: EquilibriumStudy) -> str:
     """Text for the terminal about a robot and its equilibrium, with tables. Masses are in g,
     lengths and forces in the units of the robot's scenario."""
-    robot, statics, structure = study.robot, study.statics, study.robot.structure
-    units = robot.scenario.units
+    robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
     length, force = units.length_name, units.force_name
-    lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
-    slides = ground = sticks = ""
-    if structure.contacts.size:
-        stiffness = units.shown(robot.scenario.ground.stiffness, "N/m")
-        slides, ground = ", feet free to slide", f", on a ground of {stiffness} per node"
-        sticks = f", feet held by {robot.scenario.friction.text}"
-    bodies, height = [], functools.partial(fixed, digits=units.decimals + 1)
+    rows, height = [], functools.partial(fixed, digits=units.decimals + 1)
     for body, mass in zip(structure.bodies, structure.mass, strict=True):
         nodes = study.nodes[study.nodes["body"] == body]
         load = rounded(nodes["load"].sum() / units.force)
         heights = _range(nodes["z"] / units.length, height)
-        bodies.append([body, rounded(1e3 * mass, 4), heights, load])
+        rows.append([body, rounded(1e3 * mass, 4), heights, load])
     headings = ["body", "mass (g)", f"heights of nodes ({length})", f"load on the ground ({force})"]
-    number = f"{len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}"
-    lines = [
-        f"{robot.scenario.name}: {number}, {len(structure.node_names)} nodes, "
-        f"{len(structure.cables)} cables, "
-        f"{structure.signals} oscillators, {rounded(1e3 * structure.mass.sum(), 4)} g",
-        f"Without weight: self-stress states {len(statics.self_stresses)}, "
-        f"infinitesimal mechanisms {statics.mechanisms}.",
-        f"Lowest natural frequencies without damping{slides}: {lowest or 'none'} Hz.",
-        f"At rest, without actuation{ground}:",
-        TextTable(headings, bodies).text(),
-    ]
-    if len(structure.cables):
-        rows = []
-        for group, cables in study.cables.groupby("group", sort=False):
-            lengths = (_range(cables[name] / units.length) for name in ("free_length", "length"))
-            tension = _range(cables["tension"] / units.force)
-            rows.append([str(group), str(len(cables)), *lengths, tension])
-        names = [f"free length ({length})", f"length ({length})", f"tension ({force})"]
-        lines.append(TextTable(["cables", "number", *names], rows).text())
-    if structure.held.any():
-        forces = study.nodes.loc[structure.held.any(axis=1), "anchor_x":"anchor_z"]
-        forces = forces.where(forces.abs() > _NOISE * forces.abs().to_numpy().max(), 0.0)
-        rows = [[str(node), *map(rounded, row / units.force)] for node, row in forces.iterrows()]
-        names = [f"force along {axis} ({force})" for axis in "xyz"]
-        lines.append(TextTable(["anchor", *names], rows).text())
+    tables = [TextTable(headings, rows)]
+    rows = []
+    for group, cables in study.cables.groupby("group", sort=False):
+        lengths = (_range(cables[name] / units.length) for name in ("free_length", "length"))
+        tension = _range(cables["tension"] / units.force)
+        rows.append([str(group), str(len(cables)), *lengths, tension])
+    names = [f"free length ({length})", f"length ({length})", f"tension ({force})"]
+    tables.append(TextTable(["cables", "number", *names], rows))
+    forces = study.nodes.loc[structure.held.any(axis=1), "anchor_x":"anchor_z"]
+    forces = forces.where(forces.abs() > _NOISE * forces.abs().to_numpy().max(initial=0.0), 0.0)
+    rows = [[str(node), *map(rounded, row / units.force)] for node, row in forces.iterrows()]
+    names = [f"force along {axis} ({force})" for axis in "xyz"]
+    tables.append(TextTable(["anchor", *names], rows))
+    modes = None
     if len(structure.bodies) < _LARGE:
         lowest_damped = enumerate(zip(*study.damped[:2], strict=True), start=1)
         rows = [[str(i), rounded(hertz), fixed(ratio, 4)] for i, (hertz, ratio) in lowest_damped]
-        lines.append(f"Modes with damping{sticks}:" if rows else "No oscillations with damping.")
-        headings = ["mode", "frequency (Hz)", "damping ratio"]
-        lines += [TextTable(headings, rows[:_FREQUENCIES]).text()] if rows else []
-    return "\n\n".join(lines + _faults(study))
+        modes = TextTable(["mode", "frequency (Hz)", "damping ratio"], rows[:_FREQUENCIES])
+    stiffness = units.shown(robot.scenario.ground.stiffness, "N/m")
+    return render(
+        "lab/study/structure.txt.jinja",
+        study=study,
+        mass=1e3 * structure.mass.sum(),
+        lowest=study.frequencies[:_FREQUENCIES].tolist(),
+        ground=stiffness if structure.contacts.size else "",
+        tables=tables,
+        modes=modes,
+        faults=_faults(study),
+    )
 
 
 def _faults(study: EquilibriumStudy) -> list[str]:
@@ -407,19 +398,16 @@ def _condensed(
     elastic = elastic_struts(structure)
     if not elastic.size:
         return stiffness
-    coupling, own = np.empty((len(stiffness), elastic.size)), np.empty((elastic.size, elastic.size))
     lengths = structure.strut_table.length
-    for column, strut in enumerate(elastic):
-        ends = []
-        for sign in (-1.0, 1.0):
-            elongation = np.zeros(len(lengths))
-            elongation[strut] = sign * _ELONGATION * lengths[strut]
-            p_BN = elongated(structure, elongation)
-            longer = Unactuated(unactuated.model._replace(p_BN=p_BN))
-            axial = axial_forces(structure, longer, state)[elastic]
-            ends.append((force_at_rest(longer, state), axial))
-        step = 2.0 * _ELONGATION * lengths[strut]
-        coupling[:, column] = (ends[0][0] - ends[1][0]) / step
-        own[:, column] = (ends[0][1] - ends[1][1]) / step
+
+    def forces_released(elongation: np.ndarray) -> np.ndarray:
+        of_all = np.zeros(len(lengths))
+        of_all[elastic] = elongation
+        longer = Unactuated(unactuated.model._replace(p_BN=elongated(structure, of_all)))
+        axial = axial_forces(structure, longer, state)[elastic]
+        return -np.append(force_at_rest(longer, state), axial)
+
+    found = derivatives(forces_released, _ELONGATION * lengths[elastic])
+    coupling, own = np.split(found, [len(stiffness)])
     own += np.diag(structure.strut_stiffness[elastic])
     return np.asarray(stiffness - coupling @ np.linalg.solve(own, coupling.T))

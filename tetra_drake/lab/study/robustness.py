@@ -31,7 +31,7 @@ from tetra_drake.figures.style import (
     titled,
     write_beside,
 )
-from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
+from tetra_drake.formatting import TextTable, fixed, percents, ranged, render, rounded, signed
 from tetra_drake.lab.page import save_findings
 from tetra_drake.lab.study.statistics import interval, json_rows, share_interval
 from tetra_drake.machine import threads_for, versions
@@ -297,10 +297,8 @@ def chance(draws: int) -> float:
 def robustness_text(judgement: Judgement) -> str:
     """Text for the terminal: tables of the distances of gaits on disturbed robots, and of the most
     harmful disturbances."""
-    units, count = judgement.scenario.units, judgement.draws["draw"].nunique()
-    shown, counts, misses = ["undisturbed", "5 %", "50 %", "95 %"], ["failed"], ""
-    if judgement.scenario.require:
-        counts, misses = ["failed", "missed"], " and misses no requirement"
+    units, requires = judgement.scenario.units, bool(judgement.scenario.require)
+    shown, counts = ["undisturbed", "5 %", "50 %", "95 %"], ["failed", *["missed"] * requires]
     gaits, changes = [], []
     for gait, row in by_gait(judgement).iterrows():
         lengths = row / units.length
@@ -316,19 +314,16 @@ def robustness_text(judgement: Judgement) -> str:
         both = signed(row["correlation"]), fixed(row["correlation_size"])
         changes.append([*cells, f"{row['failed']:.0f}", *(["", ""] if has_none else both)])
     headings = ["disturbance", "median change", "worst", "failed", "correlation", "|correlation|"]
-    texts = [
-        f"Distances in {units.length_word} in {count} draws of disturbances: undisturbed, "
-        "percentiles, mean.\n"
-        f"Robust: share of draws in which a gait loses at most {100.0 * LOSS:g} %{misses}.\n"
-        "In brackets: 95 % confidence intervals.",
-        TextTable(["gait", *shown, "mean", "robust", *counts], gaits).text(),
-        f"What hurts most: change of the distance in {units.length_word} by one disturbance "
-        "alone.\n"
-        "Correlation: Spearman's, of factor and distance over the draws of a gait; mean, and\n"
-        f"median of its absolute value. Chance alone gives up to {chance(count):.2f}.",
-        TextTable(headings, changes).text(),
-    ]
-    return "\n\n".join(texts)
+    return render(
+        "lab/study/robustness.txt.jinja",
+        units=units,
+        draws=judgement.draws["draw"].nunique(),
+        loss=f"{100.0 * LOSS:g}",
+        requires=requires,
+        gaits=TextTable(["gait", *shown, "mean", "robust", *counts], gaits),
+        chance=chance,
+        changes=TextTable(headings, changes),
+    )
 
 
 def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
