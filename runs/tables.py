@@ -177,8 +177,8 @@ def differences(runs: Runs) -> pandas.DataFrame:
 
 
 def trust_table(runs: Runs) -> str:
-    """Table of the differences between engines and their causes, by law of friction."""
-    return rendered("trust.md", laws=differences(runs).groupby("coulomb"))
+    """Table of the differences between engines by law of friction, and their causes."""
+    return rendered("trust.md", gaits=differences(runs))
 
 
 def results_table(runs: Runs) -> str:

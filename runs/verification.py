@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import jinja2
 import numpy as np
 import verification_references as references
 import yaml
@@ -37,8 +38,11 @@ from tetra_drake.settings.refusals import TAG
 
 HERE = Path(__file__).parent / "verification"
 RESULTS = "results.json"
-GIVEN: Any = yaml.safe_load((HERE / "problems.yaml").read_text("utf-8"))
-PROBLEMS: dict[str, dict[str, Any]] = GIVEN["problems"]
+_TEXT = jinja2.Template((HERE / "problems.yaml").read_text("utf-8")).render(vars(math))
+GIVEN: Any = yaml.safe_load(_TEXT)
+PROBLEMS: dict[str, dict[str, Any]] = {
+    name: {"name": name} | problem for name, problem in GIVEN["problems"].items()
+}
 ENGINES: dict[str, dict[str, str]] = GIVEN["engines"]
 SAMPLES = 100
 Array = np.ndarray
@@ -133,14 +137,14 @@ def order_of(problem: Mapping[str, Any], name: str) -> float | None:
     """Order of convergence, from the differences of runs with a step, its half and its quarter."""
     if not (step := float(problem.get("order", {}).get(name, 0.0))):
         return None
-    runs = [run(problem, ENGINES[name]["steps"].format(step / 2**k))["found"] for k in range(3)]
+    runs = [run(problem, ENGINES[name]["steps"] % (step / 2**k))["found"] for k in range(3)]
     coarse, fine = (np.abs(a - b).max() for a, b in itertools.pairwise(runs))
     return math.log2(coarse / fine)
 
 
 def verified(name: str) -> dict[str, Any]:
     """Results of a problem: curves, and for each engine the greatest errors."""
-    problem = completed(name)
+    problem = PROBLEMS[name]
     if problem.get("follow") == "rest":
         x, found, expected = getattr(references, name)(problem.get("structure"))
         error = float(np.abs(np.subtract(found, expected)).max() / np.ptp(expected))
@@ -166,14 +170,6 @@ def verified(name: str) -> dict[str, Any]:
                 results.setdefault(engine, found["found"])
                 numbers |= {f"{prefix}{key}": found[key] for key in ("error", "drift", "s")}
     return results
-
-
-def completed(name: str) -> dict[str, Any]:
-    """A problem with its structure."""
-    problem: dict[str, Any] = {"name": name} | PROBLEMS[name]
-    if made := problem.get("made"):
-        problem["structure"] = problem["structure"] | getattr(references, made[0])(*made[1:])
-    return problem
 
 
 COLOURS = {"compiled": "#0072b2", "all": "#0072b2", "drake": "#d55e00", "mujoco": "#009e73"}
@@ -205,7 +201,7 @@ def write_page(results: Mapping[str, Any]) -> None:
 
 def save_film(name: str) -> None:
     """Films a problem, so many times as fast as its `film` says."""
-    problem = completed(name)
+    problem = PROBLEMS[name]
     scenario = scenario_of(problem, {}).with_changes({"engine": ENGINES["compiled"]["fine"]})
     result = simulate(scenario, seeded_gait(scenario), record=True)
     film = {"size": (240, 180), "fps": 12.0, "view": "side", "speed": problem["film"]}

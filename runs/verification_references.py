@@ -1,4 +1,4 @@
-"""Structures of the problems of verification/problems.yaml that are made by rules, and references.
+"""References of the problems of verification/problems.yaml.
 
 A reference is a formula of the file, see formula(), or a function here. It knows the numbers of the
 problem, not the engines.
@@ -6,7 +6,6 @@ problem, not the engines.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from types import CodeType
@@ -76,23 +75,6 @@ def formula(times: Array, case: Case) -> Array:
 # Bodies
 
 
-def four_bar_tree(windows: int, rod: Case) -> dict[str, Any]:
-    """Cranks a-b and couplers between them."""
-    nodes, pairs = {"w": [0, 9, 0]}, [[f"a{i}", f"b{i}"] for i in range(windows + 1)]
-    for i in range(windows + 1):
-        nodes |= {f"a{i}": [i, 0, 0], f"b{i}": [i, 0, 1]}
-    pairs += [[f"b{i}", f"b{i + 1}"] for i in range(windows)]
-    spin = {"velocity": ["-0.5 m/s", 0, 0], "spin": [0, "1 rad/s", 0]}
-    cranks = {f"a{i} b{i}": spin for i in range(windows + 1)}
-    return {
-        "nodes": nodes,
-        "struts": {"rod": {**rod, "pairs": pairs}},
-        "pinned": [f"b{i}" for i in range(windows + 1)],
-        "anchors": {"w": "xyz"} | {f"a{i}": "xyz" for i in range(windows + 1)},
-        "start": {"rest": False, "velocity": ["1 m/s", 0, 0], "bodies": cranks},
-    }
-
-
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 0, -1], [1, 1, -1], [0, 1, -1], [0, 1, 0]], float)
 AXES = np.cross(POINTS - np.roll(POINTS, 1, axis=0), np.roll(POINTS, -1, axis=0) - POINTS)
 """Joints of Bricard's linkage, along edges of a cube, and their axes."""
@@ -150,41 +132,7 @@ def free_body(times: Array, case: Case) -> Array:
     return centre[axis] + turning(inertia, spin, arm, times)[:, axis]
 
 
-# Contact
-
-
-def disk_tree(count: int, disk: Case) -> dict[str, Any]:
-    """A disk of 0.1 m as a ring of nodes."""
-    angles = 2.0 * np.pi * np.arange(count) / count - 0.5 * np.pi
-    nodes = {f"r{i}": [0.1 * math.cos(a), 0.1 * math.sin(a), 0] for i, a in enumerate(angles)}
-    body = {**disk, "nodes": [*nodes], "centre": [0, 0, 0]}
-    return {"nodes": nodes | {"w": [0, 9, 0]}, "bodies": {"disk": body}, "contacts": [*nodes]}
-
-
 # Cables
-
-
-def chain_tree(count: int, law: Case) -> dict[str, Any]:
-    """A folded chain."""
-    places = [[0.02 * (i > count / 2), 0, -0.05 * min(i, count - i)] for i in range(count + 1)]
-    return beads_tree(places, count, law)
-
-
-def rope_tree(count: int, law: Case) -> dict[str, Any]:
-    """A rope between two walls."""
-    angles = np.pi * np.arange(count + 2) / (count + 1)
-    places = [[0.025 * i, 0, 1e-4 * math.sin(a)] for i, a in enumerate(angles)]
-    return beads_tree(places, count, law)
-
-
-def beads_tree(places: Sequence[Sequence[float]], count: int, law: Case) -> dict[str, Any]:
-    """Beads of 10 g on cables; those at the ends, which are held, have no mass."""
-    nodes = {f"b{i}": place for i, place in enumerate(places)}
-    return {
-        "nodes": nodes,
-        "masses": {f"b{i}": "10 g" for i in range(1, count + 1)},
-        "cables": {"link": {**law, "pairs": [list(pair) for pair in itertools.pairwise(nodes)]}},
-    }
 
 
 def on_cables(times: Array, case: Case) -> Array:
@@ -236,40 +184,18 @@ def truss(tree: dict[str, Any]) -> tuple[Array, Array, Array]:
     return loads, np.array(found), np.array(expected)
 
 
-def prism_of(count: int, twist: float, density: float, stiffness: float) -> EquilibriumStudy:
-    """A prism near its equilibrium, from the angle (rad) between its ends."""
-    around = 2.0 * math.pi * np.arange(count) / count
-    nodes = {f"a{i}": [math.cos(a), math.sin(a), 0.0] for i, a in enumerate(around)}
-    nodes |= {f"b{i}": [math.cos(a), math.sin(a), 1.0] for i, a in enumerate(around + twist)}
-    ring = [(i, (i + 1) % count) for i in range(count)]
-    pairs = {"a": [[f"a{i}", f"a{j}"] for i, j in ring], "b": [[f"b{i}", f"b{j}"] for i, j in ring]}
-    pairs["side"] = [[f"a{i}", f"b{i}"] for i in range(count)]
-    k = {"stiffness": f"{stiffness} N/m", "damping": "1 N*s/m"}
-    reach = 2.0 * math.sin(math.pi / count)
-    up = math.hypot(1.0, 2.0 * math.sin(0.5 * (math.pi / 2 - math.pi / count)))
-    sizes = {"a": (reach, density), "b": (reach, density), "side": (up, density * reach)}
-    cables = {}
-    for name, (length, own) in sizes.items():
-        free = f"{length * (1.0 - own / stiffness)!r} m"
-        cables[name] = k | {"pairs": pairs[name], "free_length": free}
-    bar: dict[str, Any] = {"diameter": "4 mm", "density": "1200 kg/m^3", "node_diameter": "0 m"}
-    bar |= {"contact_radius": "0 m", "pairs": [[f"a{i}", f"b{j}"] for i, j in ring]}
-    return at_rest(nodes=nodes, struts={"bar": bar}, cables=cables)
-
-
-def twist(_: Any) -> tuple[Array, Array, Array]:
+def twist(prisms: Sequence[dict[str, Any]]) -> tuple[Array, Array, Array]:
     counts, found = np.arange(3, 9), []
-    for count in counts.tolist():
-        nodes = prism_of(count, math.pi / 2 - math.pi / count - 0.05, 10.0, 100.0).nodes
+    for tree in prisms:
+        nodes = at_rest(**tree).nodes
         first, last = np.arctan2(nodes.y, nodes.x)[["a0", "b0"]]
         found.append(math.degrees((last - first) % math.pi))
     return counts, np.array(found), 90.0 - 180.0 / counts
 
 
-def prism_modes(_: Any) -> tuple[Array, Array, Array]:
+def prism_modes(prisms: Sequence[dict[str, Any]]) -> tuple[Array, Array, Array]:
     shares = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
-    prisms = [prism_of(3, math.pi / 6, 10.0 * share, 1e6) for share in shares.tolist()]
-    found = np.array([prism.frequencies[0] ** 2 for prism in prisms])
+    found = np.array([at_rest(**tree).frequencies[0] ** 2 for tree in prisms])
     return shares, found / found[0], shares
 
 

@@ -9,8 +9,8 @@ import json
 import math
 import os
 import re
+import secrets
 import stat
-import tempfile
 import unicodedata
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -47,15 +47,11 @@ def whole_file(path: str | Path) -> Iterator[Path]:
                 pass  # a process of another user
             except (OSError, OverflowError):
                 (path.parent / match[0]).unlink(missing_ok=True)
-        handle, name = tempfile.mkstemp(
-            dir=path.parent, prefix=f".{path.stem}.{os.getpid()}.", suffix=path.suffix
-        )
-        os.close(handle)
-    temporary = Path(name)
+        unique = f"{os.getpid()}.{secrets.token_hex(4)}"
+        temporary = path.with_name(f".{path.stem}.{unique}{path.suffix}")
+        temporary.touch(exist_ok=False)
     try:
         yield temporary
-        os.umask(mask := os.umask(0))  # the mask can only be read by setting it
-        temporary.chmod(0o666 & ~mask)
         temporary.replace(path)
     except OSError as error:
         if error.errno not in _FULL:

@@ -101,8 +101,6 @@ def heading_html(text: str) -> str:
 
 _WIDTH = 100  # letters in a line of a table where there is no terminal
 _NARROW = 12  # letters; texts are not folded into narrower columns
-_UNBROKEN = str.maketrans({" ": "\u00a0", "–": "–\u2060"})
-"""Spaces and dashes that do not end a line in a browser: no-break space, and word joiner."""
 
 
 @dataclass(frozen=True)
@@ -115,15 +113,11 @@ class TextTable:
     text_columns: Sequence[int] = (0,)
     """Indices of the columns that are aligned to the left; other columns have numbers."""
 
-    @property
-    def _holds_texts(self) -> list[bool]:
-        """True for each column of texts."""
-        return [column in self.text_columns for column in range(len(self.headings))]
-
     def text(self) -> str:
         """The table as aligned lines. If it is wider than the terminal, headings of numbers are
         folded first, then texts; wide columns before narrow ones. Numbers are never folded."""
-        columns, texts = list(zip(self.headings, *self.rows, strict=True)), self._holds_texts
+        columns = list(zip(self.headings, *self.rows, strict=True))
+        texts = [column in self.text_columns for column in range(len(columns))]
         widths = [max(map(len, cells)) for cells in columns]
         least = [
             _NARROW if is_text else max([_NARROW, *map(len, cells[1:])])
@@ -155,15 +149,7 @@ class TextTable:
     def markdown(self) -> str:
         """The table in Markdown, without a line feed at the end. Numbers stay on one line in a
         browser."""
-        texts = self._holds_texts
-        lines = [self.headings, ["---" if is_text else "---:" for is_text in texts]]
-        for row in self.rows:
-            plain = [" ".join(cell.split()).replace("|", "\\|") for cell in row]
-            cells = zip(plain, texts, strict=True)
-            lines.append(
-                [cell if is_text else cell.translate(_UNBROKEN) for cell, is_text in cells]
-            )
-        return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+        return render("table.md.jinja", table=self)
 
 
 def render(template: str, **values: object) -> str:

@@ -5,35 +5,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.made_up_walk import make_row, make_walk
 
 from tests.visualization.conftest import WINDOW, opened
-from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.films.browser import do, wait_until_loaded
 from tetra_drake.lab.films.video import make_video
-from tetra_drake.robot.gait_file import load_gait
-from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
 from tetra_drake.visualization.replay import Replay
 
 pytestmark = pytest.mark.slow
 
-ROBOT = Robot.of(load_scenario("thesis"))
+WALK = make_walk(duration=5.0)
 
 
 @pytest.fixture(scope="module")
-def trajectory(data):
-    """5 s, long enough to get somewhere."""
-    changes = {"simulation.duration": "5.0 s", "engine": "!Compiled"}
-    scenario = load_scenario("thesis").with_changes(changes)
-    gait = load_gait(data / "gait_g.json", scenario)
-    return simulate(scenario=scenario, gait=gait, record=True).trajectory
-
-
-@pytest.fixture(scope="module")
-def replay(trajectory, tmp_path_factory):
+def replay(tmp_path_factory):
     path = tmp_path_factory.mktemp("replay") / "replay.html"
-    Replay(ROBOT, trajectory, "a gait: walks 1.0 in").save(path)
+    Replay(make_row(), WALK, "a gait: walks 2.0 in").save(path)
     return path
 
 
@@ -49,19 +37,19 @@ def page(browser, replay):
 PROJECT = Path(__file__).with_name("project.js").read_text("utf-8")
 
 
-def extent(page, trajectory, time):
+def extent(page, time):
     """Share of the picture's half width or height that the robot reaches."""
-    points = trajectory["p_WN"].sel(time=time).values
+    points = WALK["p_WN"].sel(time=time).values
     return np.abs(np.array(page.evaluate(PROJECT, points.tolist()))[:, :2]).max()
 
 
-def test_the_camera_follows_and_keeps_the_robot_large(page, trajectory):
+def test_the_camera_follows_and_keeps_the_robot_large(page):
     for width, height in ((300, 500), WINDOW):
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_function(f"viewer.renderer.domElement.width == {width}")
         for time in (0.0, 5.0):
             do(page, "show", time)
-            assert 0.5 < extent(page, trajectory, time) < 0.85, f"in a width of {width}"
+            assert 0.5 < extent(page, time) < 0.85, f"in a width of {width}"
 
 
 def text(page, output):
@@ -69,9 +57,9 @@ def text(page, output):
     return page.evaluate("id => document.getElementById(id).value", output)
 
 
-def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
+def test_the_bar_plays_stops_and_tells_time_and_distance(page):
     do(page, "show", 5.0)
-    x = trajectory["p_WN"].values[:, 0, 0] / INCH
+    x = WALK["p_WN"].values[:, 0, 0] / INCH
     assert text(page, "clock") == "5.0 / 5.0 s"
     assert text(page, "reached") == f"walked {x[-1] - x[0]:.1f} in"
     page.locator("#time").fill("2")

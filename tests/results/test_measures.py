@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from helpers.made_up_walk import PERIOD, make_row, make_walk
+from helpers.made_up_walk import PERIOD, make_walk
 
 from tetra_drake.laws.curves import travelling_index
-from tetra_drake.robot.measures import distance_walked, dominant_frequency, intervals, last_step
+from tetra_drake.robot.measures import dominant_frequency, intervals, last_step
 
 TIMES = np.linspace(0.0, 15.0, 1501)
 UNEVEN = np.sort(np.concatenate([TIMES, np.linspace(4.0, 5.0, 37)]))
@@ -16,13 +16,6 @@ UNEVEN = np.sort(np.concatenate([TIMES, np.linspace(4.0, 5.0, 37)]))
 @pytest.fixture(scope="module")
 def walk():
     return make_walk()
-
-
-def test_the_distance_is_that_of_the_first_marker(walk):
-    structure = make_row().structure
-    turned = walk.copy(deep=True)
-    turned.p_WN.loc[{"node": "T1 bottom_left", "axis": "x"}] = 0.3 + walk.time.values**2
-    np.testing.assert_allclose(distance_walked(turned, structure), walk.time**2)
 
 
 def test_an_interval_begins_one_sample_before_it_shows():

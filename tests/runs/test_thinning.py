@@ -1,5 +1,7 @@
 """A thinned run: the gaits that matter are whole, every evaluation is there."""
 
+import itertools
+
 import numpy as np
 import pandas
 import pytest
@@ -25,6 +27,8 @@ RISING = [12.0 + i for i in range(2 * BEST_GAITS)]
 LOW = GENERATOR.uniform(1.0, 11.0, 31).tolist()
 FITNESS = [[*LOW[:6], *RISING, *LOW[6:]], GENERATOR.normal(8.0, 3.0, 41).tolist()]
 FITNESS[0][AGAIN : BEYOND + 1] = [2.5, 2.0, 3.0, 4.0]
+PLACES = {2.0: (0.1, 0.45), 3.0: (1.00001 / 3.0, 0.59), 4.0: (0.5, 0.59)}
+"""On the map, by fitness; of all others one place."""
 TRIALS = [
     [
         [(f, i) for i, f in enumerate(trial[:6])],
@@ -33,14 +37,6 @@ TRIALS = [
     for trial in FITNESS
 ]
 """Six initial gaits, then 35 that take the places of one another, and a failure."""
-
-
-def metrics_of(trial, i, fitness):
-    """More metrics than a synthetic run has."""
-    special = {ALONE: (0.1, 0.45), EDGE: (1.00001 / 3.0, 0.59), BEYOND: (0.5, 0.59)}
-    index, lifted = special.get(i if trial == 0 else -1, (0.9, 0.5))
-    chosen = {"travelling_index": index, "lifted": lifted, "twist": 0.1 + fitness / 70.0}
-    return chosen | {"tension": 1.0 / 3.0}  # which selects no gaits
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +48,10 @@ def runs(tmp_path_factory):
     field = HeightField(file=str(folder / "level.npy"), cell=0.5)
     changes = {"optimizer": kind, "engine": "!Compiled", "terrain": field}
     metrics = {}
-    for number, trial in enumerate(FITNESS):
-        metrics |= {fitness: metrics_of(number, i, fitness) for i, fitness in enumerate(trial)}
+    for fitness in itertools.chain(*FITNESS):
+        index, lifted = PLACES.get(fitness, (0.9, 0.5))
+        chosen = {"travelling_index": index, "lifted": lifted, "twist": 0.1 + fitness / 70.0}
+        metrics[fitness] = chosen | {"tension": 1.0 / 3.0}  # which selects no gaits
     scenario = tiny_scenario().with_changes(changes)
     run = write_run(folder / "run", TRIALS, scenario=scenario, metrics=metrics)
     recorded = load_run(run)

@@ -76,8 +76,8 @@ def test_differences_are_keys_and_readable_values(scenario):
     changes |= {"optimizer.stop_rise": 0.1 + 0.2, "friction.stiction_damping": "0.3 lbf*s/in"}
     changed = scenario.with_changes(changes | {"robot.offsets": [["1 mm", 0, 0]] * 5})
     assert changed.differences(scenario) == [
-        ("robot.cables.slack", "true"),
         ("robot.offsets", f"[{', '.join(['[1 mm, 0, 0]'] * 5)}]"),
+        ("robot.cables.slack", "true"),
         ("friction.stiction_damping", "0.3 lbf*s/in"),
         ("cpg.signals", "listing"),
         ("optimizer.stop_rise", "0.3"),

@@ -81,15 +81,11 @@ def address(site):
     server.shutdown()
 
 
-def pages_of(site):
-    replays = site.glob("runs/*/replay.html")
-    return sorted(set(site.rglob("*.html")) - set(replays) - {site / "404.html"})
-
-
 @pytest.mark.slow
 def test_no_page_is_wider_than_a_phone_or_complains(site, address, browser):
     wide = "document.scrollingElement.scrollWidth - innerWidth"
-    names = [str(page.relative_to(site)) for page in pages_of(site)]
+    pages = {*site.rglob("*.html")} - {*site.glob("runs/*/replay.html"), site / "404.html"}
+    names = [str(page.relative_to(site)) for page in sorted(pages)]
     with opened(browser, f"{address}index.html", size=PHONE, offline=False) as page:
         wider = []
         for name in [name for name in names if not name.startswith("tests/data/corpus/p")]:

@@ -68,7 +68,7 @@ def _text(value: Any) -> str | None:
 
 @functools.cache  # many kernels use the same functions
 def _head(function: Any) -> str:
-    """What machine code takes from a function or kernel, such as the module in which its names are
+    """What machine code takes from a function or kernel, such as the module where its names are
     looked up, without the values that it uses."""
     options = getattr(function, "targetoptions", {})
     function = getattr(function, "py_func", function)

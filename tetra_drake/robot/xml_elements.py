@@ -9,13 +9,10 @@ from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 import numpy as np
 
 
-def add_element(parent: Element, tag: str, text: Any = None, **attributes: Any) -> Element:
-    """Adds an element `tag` to `parent` and returns it. Its text and attributes are texts, numbers
-    or arrays of numbers, which are written with spaces in between."""
-    written = {name: _written(value) for name, value in attributes.items()}
-    element = SubElement(parent, tag, written)
-    element.text = None if text is None else _written(text)
-    return element
+def add_element(parent: Element, tag: str, **attributes: Any) -> Element:
+    """Adds an element `tag` to `parent` and returns it. Its attributes are texts, numbers or arrays
+    of numbers, which are written with spaces in between."""
+    return SubElement(parent, tag, {name: _written(value) for name, value in attributes.items()})
 
 
 def add_comment(parent: Element, text: str) -> None:
@@ -30,6 +27,6 @@ def xml_text(root: Element) -> str:
 
 
 def _written(value: Any) -> str:
-    """Text of an attribute's or element's value: numbers with all their digits, arrays with spaces
+    """Text of an attribute's value: numbers with all their digits, arrays with spaces
     in between."""
     return value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))

@@ -251,11 +251,17 @@ class Blueprint:
         return len(self.oscillators)
 
     @functools.cached_property
+    def _middles(self) -> np.ndarray:
+        """Middles of the cables (cables, 3): means of the middles of their straight pieces."""
+        sums = self.p_WN[self.segments.ends].mean(axis=1).T
+        sums = np.stack([self.along_cables(of_pieces) for of_pieces in sums], axis=1)
+        return sums / np.bincount(self.segments.cable)[:, np.newaxis]
+
+    @functools.cached_property
     def sides(self) -> np.ndarray:
         """Side of each oscillator's cables (oscillators,): 1.0 if the middles of all of them are on
         the left, -1.0 on the right, 0.0 otherwise."""
-        middles, least = self.p_WN[self.segments.ends].mean(axis=1)[:, 1], self._least_distance
-        y = np.bincount(self.segments.cable, middles) / np.bincount(self.segments.cable)
+        y, least = self._middles[:, 1], self._least_distance
         is_left = [(y[list(cables)] > least).all() for cables in self.groups]
         is_right = [(y[list(cables)] < -least).all() for cables in self.groups]
         return np.array(is_left, dtype=float) - np.array(is_right, dtype=float)
@@ -264,12 +270,7 @@ class Blueprint:
     def images(self) -> tuple[int | None, ...]:
         """For each oscillator, the index of the oscillator that drives exactly the mirror images of
         its cables in the plane y = 0, such as itself; None if there is none."""
-        middles = [
-            self.p_WN[self.segments.ends[self.segments.cable == cable]].mean(axis=(0, 1))
-            for cable in range(len(self.cable_ends))
-        ]
-        middle = np.reshape(middles, (-1, 1, 3))
-        paths = np.concatenate([self.p_WN[self.cable_ends], middle], axis=1)
+        paths = np.hstack([self.p_WN[self.cable_ends], self._middles[:, np.newaxis]])
         image_of_cable: list[int] = []
         for mirrored, group in zip(paths * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
             forward = np.abs(paths - mirrored).max(axis=(1, 2))
@@ -390,9 +391,9 @@ class Blueprint:
     def _check_places(self) -> None:
         """Raises InputError for two nodes at the same position, unless nothing leads to one of
         them."""
-        ends, least = np.unique([*self.segments.ends, *self.struts]), LEAST_DISTANCE * self.shortest
-        between = self.p_WN[ends] - self.p_WN[ends, np.newaxis]
-        is_near = np.linalg.norm(between, axis=2) < least
+        ends = np.unique(np.vstack([self.segments.ends, self.struts]))
+        p_WN, least = self.p_WN[ends], LEAST_DISTANCE * self.shortest
+        is_near = np.linalg.norm(p_WN - p_WN[:, np.newaxis], axis=2) < least
         is_near &= self.places[ends] != self.places[ends, np.newaxis]
         for first, second in np.argwhere(is_near):
             problem = f"found the place of '{self.node_names[ends[first]]}'"
@@ -408,7 +409,7 @@ class Blueprint:
             problem = "has length 0 between nodes of a joint, expected nodes at two places"
             refuse(self.cable_keys[self.segments.cable[piece]], problem)
         for cable, key in enumerate(self.cable_keys):
-            first, *others = {*pairs[self.segments.cable == cable].ravel().tolist()}
+            first, *others = self.bodies_at([cable])
             if first == WORLD and not others:
                 refuse(key, "joins two fixed nodes, expected a node of a strut")
             if not others:

@@ -10,7 +10,7 @@ import json
 import re
 from collections.abc import Iterable
 
-from tetra_drake.formatting import listed
+from tetra_drake.formatting import listed, render
 from tetra_drake.scenario.metrics import METRICS, Metrics
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
@@ -22,15 +22,6 @@ from tetra_drake.settings.units import plainest
 
 PAGE = SCENARIOS / "KEYS.md"
 
-_INTRODUCTION = """\
-# Keys of a scenario
-
-`python -m tetra_drake.scenario.keys` writes this page. See [Scenarios](README.md) for examples.
-
-A quantity may have any unit that converts to the one given here. A key that has no default and is
-not optional is in your file or in its `base`. Of the kinds of a section, the first needs no tag.
-NAME stands for a name of your choice, [0] for any item of a list."""
-
 _WORDS = {"string": "text", "boolean": "true or false"}
 _LIMITS = {
     "exclusiveMinimum": "> {}",
@@ -38,9 +29,6 @@ _LIMITS = {
     "exclusiveMaximum": "< {}",
     "maximum": "≤ {}",
 }
-_ABOUT_METRICS = """\
-`require` limits a cost from above, any other metric from below. Some metrics are of the named
-robots alone."""
 
 
 def schema_text(*, structure: bool = False) -> str:
@@ -67,28 +55,23 @@ def schema_text(*, structure: bool = False) -> str:
 
 def keys_page() -> str:
     """Page of all keys of scenario files in Markdown, with unit, limits, default and meaning."""
-    parts, others = [_INTRODUCTION], []
-    schema = Scenario.model_json_schema()
+    schema, sections, others = Scenario.model_json_schema(), [], []
     for key, node in schema["properties"].items():
         items, told = node.get("items"), dict[str, tuple[str, str, str]]()
-        sections = [one for one in members_of(items or node, schema) if "$ref" in one]
+        kinds = [one for one in members_of(items or node, schema) if "$ref" in one]
         inner = f"{key}[0]" if items else key
-        for section in sections:
-            title = section.get("title", "")
-            parts.append(f"## `{inner}`" + (f": `{title}`" if title else ""))
-            parts.append(" ".join(section.get("description", "").split()))
-            rows = [row for row in keys_in(section, schema, inner) if "description" in row[1]]
-            parts.append(_list_of_keys(rows, told, title))
-        others += [] if sections else [(key, node)]
-    parts += ["## Other keys", _list_of_keys(others, {}, "")]
-    metrics, texts = [], attribute_docstrings(Metrics)
-    for name, metric in METRICS.items():
-        about = [metric.unit or "1", "cost" if metric.is_cost else "", metric.needs]
-        text = " ".join(texts[name].split())
-        metrics.append(f"- `{name}` ({', '.join(filter(None, about))}): {text}")
-    parts += ["## Metrics", " ".join((Metrics.__doc__ or "").split()), _ABOUT_METRICS]
-    parts.append("\n".join(metrics))
-    return "\n\n".join(filter(None, parts)) + "\n"
+        for kind in kinds:
+            rows = [row for row in keys_in(kind, schema, inner) if "description" in row[1]]
+            sections.append((inner, kind, _list_of_keys(rows, told, kind.get("title", ""))))
+        others += [] if kinds else [(key, node)]
+    return render(
+        "scenario/KEYS.md.jinja",
+        sections=sections,
+        others=_list_of_keys(others, {}, ""),
+        about=Metrics.__doc__,
+        metrics=METRICS,
+        texts=attribute_docstrings(Metrics),
+    )
 
 
 def _list_of_keys(
