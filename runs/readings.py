@@ -16,7 +16,7 @@ from typing import TypeAlias
 
 import numpy as np
 import pandas
-from script import chosen, evolved, read_record, read_settings, script
+from script import chosen, evolved, read_record, read_settings, script, with_defaults
 
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import check_file, read_json, write_whole
@@ -34,8 +34,13 @@ Record: TypeAlias = dict[str, list[dict[str, float]]]
 """Numbers of the trials by reading."""
 
 
-READINGS, FUTURE, THESIS = read_settings(HERE / "readings.yaml").values()
-"""Readings, and variations that the thesis proposes, by name; and the thesis's results."""
+_FILE = HERE / "readings.yaml"
+_DEFAULTS, *_READINGS, THESIS = read_settings(_FILE).values()
+READINGS, FUTURE = (
+    {name: with_defaults(given, _DEFAULTS, _FILE) for name, given in each.items()}
+    for each in _READINGS
+)
+"""Readings, and variations that the thesis proposes, by name. THESIS has its results."""
 ALL = READINGS | FUTURE
 COARSE, FIXED = (READINGS[f"slip-{name}"]["changes"]["engine"] for name in ("coarse", "fixed"))
 """Engines of two readings."""
@@ -43,10 +48,10 @@ COARSE, FIXED = (READINGS[f"slip-{name}"]["changes"]["engine"] for name in ("coa
 
 def run_of(name: str) -> Run:
     """The run of a reading, evolved as far as it is not yet."""
-    reading = {"base": "thesis", "changes": {}} | ALL[name]
-    if "trials_of" in reading:
+    reading = ALL[name]
+    if reading["trials_of"]:
         return run_of(reading["trials_of"])
-    if "run" in reading:
+    if reading["run"]:
         return load_run(HERE / reading["run"])
     base = load_scenario(reading["base"]).on_engine("compiled")
     changes = {"name": f"reading-{name}"} | reading["changes"]
@@ -86,7 +91,7 @@ def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
 def numbers(name: str) -> list[dict[str, float]]:
     """Numbers of the trials of a reading."""
     run = run_of(name)
-    settings = SteadyState(**dict(run.scenario.optimizer) | ALL[name].get("stop", {}))
+    settings = SteadyState(**dict(run.scenario.optimizer) | ALL[name]["stop"])
     trials = range(run.scenario.evolution.trials)
     rows = [numbers_of(run, trial, settings) for trial in trials]
     return [{key: float(f"{value:.5g}") for key, value in row.items()} for row in rows]
