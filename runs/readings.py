@@ -33,13 +33,8 @@ SCRATCH = Path("out/readings")
 Record: TypeAlias = dict[str, list[dict[str, float]]]
 """Numbers of the trials by reading."""
 
-
-_FILE = HERE / "readings.yaml"
-_DEFAULTS, *_READINGS, THESIS = read_settings(_FILE).values()
-READINGS, FUTURE = (
-    {name: with_defaults(given, _DEFAULTS, _FILE) for name, given in each.items()}
-    for each in _READINGS
-)
+FILE = HERE / "readings.yaml"
+DEFAULTS, READINGS, FUTURE, THESIS = read_settings(FILE).values()
 """Readings, and variations that the thesis proposes, by name. THESIS has its results."""
 ALL = READINGS | FUTURE
 COARSE, FIXED = (READINGS[f"slip-{name}"]["changes"]["engine"] for name in ("coarse", "fixed"))
@@ -48,7 +43,7 @@ COARSE, FIXED = (READINGS[f"slip-{name}"]["changes"]["engine"] for name in ("coa
 
 def run_of(name: str) -> Run:
     """The run of a reading, evolved as far as it is not yet."""
-    reading = ALL[name]
+    reading = with_defaults(ALL[name], DEFAULTS, FILE)
     if reading["trials_of"]:
         return run_of(reading["trials_of"])
     if reading["run"]:
@@ -91,7 +86,7 @@ def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
 def numbers(name: str) -> list[dict[str, float]]:
     """Numbers of the trials of a reading."""
     run = run_of(name)
-    settings = SteadyState(**dict(run.scenario.optimizer) | ALL[name]["stop"])
+    settings = SteadyState(**dict(run.scenario.optimizer) | ALL[name].get("stop", {}))
     trials = range(run.scenario.evolution.trials)
     rows = [numbers_of(run, trial, settings) for trial in trials]
     return [{key: float(f"{value:.5g}") for key, value in row.items()} for row in rows]

@@ -66,14 +66,6 @@ def with_defaults(given: Mapping[str, Any], defaults: Mapping[str, Any], file: P
     return {**defaults, **given}
 
 
-def with_defaults(given: Mapping[str, Any], defaults: Mapping[str, Any], file: Path) -> Any:
-    """An entry of a file of settings, with the defaults of what it leaves out. Raises InputError
-    for a key without a default."""
-    if unknown := given.keys() - defaults.keys():
-        raise InputError(file, min(unknown), f"is unknown, expected one of {listed([*defaults])}")
-    return {**defaults, **given}
-
-
 def read_record(path: Path, use: Callable[[Any], T], command: str) -> T:
     """What a function makes of a record in JSON. Raises InputError, which names the command that
     makes the record, if it is missing or damaged."""
