@@ -150,15 +150,11 @@ def analyse(directory: Path, *, workers: int) -> None:
 
 def best_gaits(run: Run) -> list[dict[str, Any]]:
     """Table of the fittest gait of each trial; see Analysis."""
+    best = run.best().rename(columns={"index": "evaluation"})
     made = {status.number: status.evaluations for status in run.statuses}
-    rows = []
-    for _, gait in run.best().iterrows():
-        trial = int(gait["trial"])
-        row = {"trial": trial, "evaluation": int(gait["index"]), "evaluations": made[trial]}
-        names = ("fitness", *SHOWN, SPEED, *_turned(run.scenario))
-        numbers = {name: json_number(float(gait[name])) for name in names}
-        rows.append(row | numbers)
-    return rows
+    best = best.assign(evaluations=best["trial"].map(made)).set_index("trial")
+    names = ["evaluation", "evaluations", "fitness", *SHOWN, SPEED, *_turned(run.scenario)]
+    return json_rows(best[names])
 
 
 def _turned(scenario: Scenario) -> list[str]:

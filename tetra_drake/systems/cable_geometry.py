@@ -97,8 +97,8 @@ class Cylinders(NamedTuple):
 def AddCableGeometry(
     builder: DiagramBuilder, scene_graph: SceneGraph, cables: CableNetwork, lengths: np.ndarray
 ) -> None:
-    """Shows cables in a scene. `lengths` (pieces,) in m are those of their straight pieces at the
-    start."""
+    """Shows cables in a scene. `lengths` (pieces,) are the lengths of their straight pieces at the
+    start, in m."""
     source = scene_graph.RegisterSource(cables.get_name())
     cylinders = RegisterCylinders(
         scene_graph, source, lengths=dict(zip(cables.pieces, lengths.tolist(), strict=True))
