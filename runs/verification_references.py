@@ -184,41 +184,16 @@ def truss(tree: dict[str, Any]) -> tuple[Array, Array, Array]:
     return loads, np.array(found), np.array(expected)
 
 
-def prism_of(count: int, twist: float, density: float, stiffness: float) -> EquilibriumStudy:
-    """A prism near its equilibrium, from the angle (rad) between its ends."""
-    around = 2.0 * math.pi * np.arange(count) / count
-    nodes = {f"a{i}": [math.cos(a), math.sin(a), 0.0] for i, a in enumerate(around)}
-    nodes |= {f"b{i}": [math.cos(a), math.sin(a), 1.0] for i, a in enumerate(around + twist)}
-    ring = [(i, (i + 1) % count) for i in range(count)]
-    pairs = {"a": [[f"a{i}", f"a{j}"] for i, j in ring], "b": [[f"b{i}", f"b{j}"] for i, j in ring]}
-    pairs["side"] = [[f"a{i}", f"b{i}"] for i in range(count)]
-    k = {"stiffness": f"{stiffness} N/m", "damping": "1 N*s/m"}
-    reach = 2.0 * math.sin(math.pi / count)
-    up = math.hypot(1.0, 2.0 * math.sin(0.5 * (math.pi / 2 - math.pi / count)))
-    sizes = {"a": (reach, density), "b": (reach, density), "side": (up, density * reach)}
-    cables = {}
-    for name, (length, own) in sizes.items():
-        free = f"{length * (1.0 - own / stiffness)!r} m"
-        cables[name] = k | {"pairs": pairs[name], "free_length": free}
-    bar: dict[str, Any] = {"diameter": "4 mm", "density": "1200 kg/m^3", "node_diameter": "0 m"}
-    bar |= {"contact_radius": "0 m", "pairs": [[f"a{i}", f"b{j}"] for i, j in ring]}
-    return at_rest(nodes=nodes, struts={"bar": bar}, cables=cables)
-
-
-def twist(_: Any) -> tuple[Array, Array, Array]:
-    counts, found = np.arange(3, 9), []
-    for count in counts.tolist():
-        nodes = prism_of(count, math.pi / 2 - math.pi / count - 0.05, 10.0, 100.0).nodes
-        first, last = np.arctan2(nodes.y, nodes.x)[["a0", "b0"]]
-        found.append(math.degrees((last - first) % math.pi))
+def twist(prisms: list[Any]) -> tuple[Array, Array, Array]:
+    counts, nodes = np.arange(3, 9), [at_rest(**tree).nodes for tree in prisms]
+    turned = [np.arctan2(each.y, each.x) for each in nodes]
+    found = [math.degrees((angle["b0"] - angle["a0"]) % math.pi) for angle in turned]
     return counts, np.array(found), 90.0 - 180.0 / counts
 
 
-def prism_modes(_: Any) -> tuple[Array, Array, Array]:
-    shares = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
-    prisms = [prism_of(3, math.pi / 6, 10.0 * share, 1e6) for share in shares.tolist()]
-    found = np.array([prism.frequencies[0] ** 2 for prism in prisms])
-    return shares, found / found[0], shares
+def prism_modes(prisms: list[Any]) -> tuple[Array, Array, Array]:
+    shares, squares = 2.0 ** np.arange(5), [at_rest(**tree).frequencies[0] ** 2 for tree in prisms]
+    return shares, np.array(squares) / squares[0], shares
 
 
 def rope_modes(tree: dict[str, Any]) -> tuple[Array, Array, Array]:
