@@ -31,7 +31,6 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.formatting import fixed, listed
 from tetra_drake.machine import available_cores
-from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.settings.units import INCH
 
 EVALUATIONS, ON_DIAGRAM = 300, 60
@@ -74,17 +73,13 @@ def first_difference(run: Run) -> str:
         ]
         found = {task.index: evaluation for task, evaluation in evaluate_all(evaluator, tasks)}
     for index in kept:
-        before, now = trial.loc[index, "distance_in"], distance_in(found[index])
+        before = trial.loc[index, "distance_in"]
+        now = found[index].metrics.get("distance", math.nan) / INCH
         if goes_elsewhere(run, index, before, now):
             return f"evaluation {index} goes {fixed(now, 3)} in, not {fixed(before, 3)} in"
     if all(alike):
         return ""
     return f"search differs at evaluation {kept[alike.index(False)]} or earlier"
-
-
-def distance_in(evaluation: Evaluation) -> float:
-    """Distance (in) of a gait; NaN of a failure."""
-    return evaluation.metrics.get("distance", math.nan) / INCH
 
 
 def goes_elsewhere(run: Run, index: int, before: float, now: float) -> bool:

@@ -28,14 +28,12 @@ from pathlib import Path
 from typing import Any
 
 from analyse import ANALYSIS, analyse
-from script import chosen, read_settings, script
+from script import chosen, evolved, read_settings, script
 from thinning import thin
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import MANIFEST, read_manifest
-from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import load_run
-from tetra_drake.experiment import evolve
 from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import read_json, write_whole
@@ -107,12 +105,10 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
         return
     if not (made / MANIFEST).exists() and is_unfinished(shown, scenario):
         thin(shown, made, whole=True)
-    resume, progress = (made / MANIFEST).exists(), Progress(sys.stdout)
-    if not resume:
+    if not (made / MANIFEST).exists():
         save_times(load_times(out) | {name: {}}, out)
     with timed(name, EVOLUTION, out):
-        # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
-        evolve(scenario, made, resume=resume, reevaluate=False, report=False, progress=progress)
+        evolved(scenario, made)
     publish(name, experiment, made, out=out)
 
 
