@@ -23,7 +23,6 @@ on an idle machine.
 from __future__ import annotations
 
 import functools
-import itertools
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -32,7 +31,9 @@ from pathlib import Path
 from timeit import timeit
 from typing import Any
 
+import jinja2
 import numpy as np
+import yaml
 from pydrake.systems.analysis import GetIntegrationSchemes, ResetIntegratorFromFlags, Simulator
 from script import chosen, read_settings, script
 
@@ -50,7 +51,6 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
-from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -221,7 +221,9 @@ def sizes_table(scenario: Scenario) -> TextTable:
     duration, table = {"simulation.duration": scenario.simulation.duration}, []
     for kind, size in [(kind, size) for kind, sizes in GIVEN["sizes"].items() for size in sizes]:
         if tile := GIVEN["tiles"].get(kind):
-            one = load_scenario(tile["scenario"]).with_sections(robot=tiled(tile, size))
+            text = jinja2.Template(tile["structure"]).render(side=size)
+            robot = StructureFile.from_tree(yaml.safe_load(text), kind)
+            one = load_scenario(tile["scenario"]).with_sections(robot=robot)
         else:
             one = scenario.with_changes({"robot.tetrahedra": size, "cpg.reach": 1})
         bodies, on_diagram = one.robot.body_count, ""
@@ -235,40 +237,6 @@ def sizes_table(scenario: Scenario) -> TextTable:
     headings = ["robot", "bodies", "compiled: µs per step and body, one gait"]
     headings += [f"{LANES} gaits at a time", "drake: s per simulated second"]
     return TextTable(headings, table)
-
-
-def tiled(tile: Any, side: int) -> StructureFile:
-    """A robot of equal tiles, `side` of them along each axis; see `tiles` in the file."""
-    robot = Robot.of(load_scenario(tile["scenario"]))
-    p_WN = node_positions(robot.structure, robot.structure.initial_state)
-    named = dict(zip(robot.structure.node_names, p_WN, strict=True))
-    nodes = {name: place for name, place in named.items() if name.startswith(tile["nodes"])}
-    spots = [*itertools.product(range(side), range(side if tile["axes"] == 2 else 1))]
-
-    def copied(pairs: Sequence[Sequence[str]], by: Sequence[int] = (0, 0)) -> list[list[str]]:
-        """Pairs of nodes in all tiles, the second node in the tile that is further `by`."""
-        ends = [(spot, (spot[0] + by[0], spot[1] + by[1])) for spot in spots]
-        return [
-            [f"{a}-{i}-{j}", f"{b}-{x}-{y}"]
-            for (i, j), (x, y) in ends
-            if (x, y) in spots
-            for a, b in pairs
-        ]
-
-    tree = robot.scenario.robot.model_dump()
-    for group in (*tree["struts"].values(), *tree["cables"].values()):
-        group["pairs"] = copied([pair for pair in group["pairs"] if {*pair} <= {*nodes}])
-    for link in tile["links"]:
-        group = tree["cables"].setdefault(link["group"], {**tile.get("link", {}), "pairs": []})
-        group["pairs"] += copied(link["pairs"], link["by"])
-    for part in ("struts", "cables"):
-        tree[part] = {name: group for name, group in tree[part].items() if group["pairs"]}
-    tree["nodes"] = {
-        f"{name}-{i}-{j}": (place + np.array([i, j, 0.0]) * [*tile["step"], 0.0]).tolist()
-        for i, j in spots
-        for name, place in nodes.items()
-    }
-    return StructureFile.model_validate(tree | {"actuated": tile["actuated"]})
 
 
 def schemes_table(thesis: Scenario) -> TextTable:

@@ -21,7 +21,6 @@ from script import measured, script
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import read_json, write_whole
-from tetra_drake.laws.phase import PhaseOscillators
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.parameter_space import ParameterSpace, Vector
 from tetra_drake.robot.robot import Robot
@@ -37,15 +36,10 @@ PERIOD = 0.01
 """Time (s) between samples of signals."""
 
 
-def oscillators(amplitude: float, *, start_up: float = 1.25) -> PhaseOscillators:
-    """Oscillators whose gaits are travelling sines of this amplitude (N)."""
-    return PhaseOscillators(
-        gain=amplitude,
-        start_up=start_up,
-        amplitude=[1.0, 1.0],
-        coupling=[5.0, 5.0],
-        common=["lag"],
-    )
+def oscillators(amplitude: float, *, start_up: float = 1.25) -> str:
+    """Oscillators whose gaits are travelling sines of this amplitude (N), as text of a scenario."""
+    own = f"gain: {amplitude!r} N, start_up: {start_up!r} s"
+    return f"!Phase {{{own}, amplitude: [1, 1], coupling: [5 /s, 5 /s], common: [lag]}}"
 
 
 def grid(space: ParameterSpace) -> list[Vector]:

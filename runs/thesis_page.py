@@ -23,7 +23,7 @@ from claims import MOTION, claims
 from page import over, rendered
 from record import load_times
 from script import read_record, script
-from settle import difference_of_means, numbers
+from settle import difference_of_means
 from sine import TRIED, load_sines, steady_signals, steady_times
 from tables import aspect, best_gait
 from thesis_figures import save_figures
@@ -181,9 +181,8 @@ def reached(name: str) -> str:
 
 def apart(first: str, second: str) -> str:
     """Difference of the mean distances (in) of two runs, second minus first, and its interval."""
-    distances = [numbers(load_analysis(HERE / name)) for name in (first, second)]
-    name = "distance where it was evolved, in"
-    return ranged(*difference_of_means(distances[0][name], distances[1][name]))
+    distances = (load_analysis(HERE / name).disturbed["undisturbed"] for name in (first, second))
+    return ranged(*difference_of_means(*(each.to_numpy() / INCH for each in distances)))
 
 
 def without_slip(run: Run) -> str:

@@ -7,7 +7,7 @@ problem, not the engines.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import CodeType
 from typing import Any
 
@@ -184,16 +184,19 @@ def truss(tree: dict[str, Any]) -> tuple[Array, Array, Array]:
     return loads, np.array(found), np.array(expected)
 
 
-def twist(prisms: list[Any]) -> tuple[Array, Array, Array]:
-    counts, nodes = np.arange(3, 9), [at_rest(**tree).nodes for tree in prisms]
-    turned = [np.arctan2(each.y, each.x) for each in nodes]
-    found = [math.degrees((angle["b0"] - angle["a0"]) % math.pi) for angle in turned]
+def twist(prisms: Sequence[dict[str, Any]]) -> tuple[Array, Array, Array]:
+    counts, found = np.arange(3, 9), []
+    for tree in prisms:
+        nodes = at_rest(**tree).nodes
+        first, last = np.arctan2(nodes.y, nodes.x)[["a0", "b0"]]
+        found.append(math.degrees((last - first) % math.pi))
     return counts, np.array(found), 90.0 - 180.0 / counts
 
 
-def prism_modes(prisms: list[Any]) -> tuple[Array, Array, Array]:
-    shares, squares = 2.0 ** np.arange(5), [at_rest(**tree).frequencies[0] ** 2 for tree in prisms]
-    return shares, np.array(squares) / squares[0], shares
+def prism_modes(prisms: Sequence[dict[str, Any]]) -> tuple[Array, Array, Array]:
+    shares = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    found = np.array([at_rest(**tree).frequencies[0] ** 2 for tree in prisms])
+    return shares, found / found[0], shares
 
 
 def rope_modes(tree: dict[str, Any]) -> tuple[Array, Array, Array]:

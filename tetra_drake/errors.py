@@ -122,6 +122,8 @@ def checked_numbers(
 class SimulationFailure(RuntimeError):
     """A simulation that failed at `time` (s) for a `reason`."""
 
+    kind = "failed"
+    """First word of the reason in a record."""
     fitness = -math.inf
     """Fitness of a gait that failed, for optimisers."""
     wall_time = 0.0
@@ -150,6 +152,8 @@ class Diverged(SimulationFailure):
     """Failure of a simulation whose motion is not finite, too fast, or too hard for the
     integrator."""
 
+    kind = "diverged"
+
     @classmethod
     def too_fast(cls, *, time: float, limit: float) -> Self:
         """The failure of a robot that has a body faster than `limit` (m/s), at `time` (s)."""
@@ -160,10 +164,13 @@ class Diverged(SimulationFailure):
 class StepBudgetExceeded(SimulationFailure):
     """Failure of a simulation that used up its budget of derivative evaluations."""
 
+    kind = "step budget"
+
 
 class TimeBudgetExceeded(Exception):
     """Failure of a simulation that used up its limit of CPU time. It is not a RuntimeError,
     because engines treat a RuntimeError as divergence."""
 
+    kind = "time budget"
     wall_time = 0.0
     """Wall time of the simulation in s; 0 if the engine does not measure it."""

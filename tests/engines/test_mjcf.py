@@ -24,8 +24,7 @@ from tetra_drake.lab.study.equilibrium import (
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.systems import AddCables
-from tetra_drake.systems.diagram import cables_of
+from tetra_drake.systems import AddCables, Cable
 
 ROBOTS = ["thesis", "motors", "rough", "prism", "six_bar", "mast", "pair", "odd names"]
 NAMES = {
@@ -91,7 +90,8 @@ def test_drake_has_the_bodies_of_the_sdf_and_its_cables_the_tensions_at_rest(stu
     context = plant.CreateDefaultContext()
     p_WN = [node.CalcPoseInWorld(context).translation() for node in nodes]
     np.testing.assert_allclose(p_WN, node_positions(structure, state), atol=1e-9)
-    cables = cables_of(structure, nodes)
+    ends = zip(structure.cable_names, structure.cable_ends, structure.cable_laws, strict=True)
+    cables = [Cable(name, nodes[a], nodes[b], law) for name, (a, b), law in ends]
     network = AddCables(builder, plant, cables=cables, slack=structure.slack)
     diagram = builder.Build()
     here = network.GetMyContextFromRoot(diagram.CreateDefaultContext())

@@ -4,7 +4,6 @@ In tests/data/structures.json sines pull at the cables of structures at rest. Af
 1e-7 m apart end 3e-7 m apart there, and half the step makes a difference of 9e-8 m.
 """
 
-import dataclasses
 import json
 
 import numpy as np
@@ -13,9 +12,7 @@ from helpers.anchored import BAR, floating_prism
 from helpers.converged import shortly
 from helpers.structures import (
     driven_as_recorded,
-    poses_of,
     recorded_structure,
-    simulated,
 )
 from scipy.spatial.transform import Rotation
 
@@ -57,16 +54,6 @@ def test_driven_structures_move_as_the_independent_simulation(name, data):
 
 
 BRIEF = {"cpg.start_up": "0.2 s", "simulation.duration": "1 s", "simulation.steady_from": "0.4 s"}
-
-
-def test_equal_moments_of_inertia_walk_as_any_moments():
-    # Seen: 1e-10 m, as nodes at height 0 are in the ground by rounding or not.
-    row = Robot.of(load_scenario("coulomb").on_engine("compiled").with_changes(BRIEF))
-    general = dataclasses.replace(row, model=row.model._replace(isotropic=False))
-    assert row.model.isotropic
-    poses, others = (poses_of(simulated(each)[1].states) for each in (row, general))
-    assert np.ptp(poses[..., 4:], axis=0).max() > 0.003, "it walks"
-    np.testing.assert_allclose(others[..., 4:], poses[..., 4:], rtol=0, atol=1e-9)
 
 
 def felt(robot: Robot, *, longer: float = 1.0, pushes: float = 0.0, **gains: float):

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from verification import PROBLEMS
+from scipy.spatial.transform import Rotation
+from verification import completed
 from verification_references import formula
 
 from helpers.anchored import TREES, scenario_of, supported_prism
@@ -78,11 +79,10 @@ def turned(robot: Robot, angles: dict[int, float], pivots: dict[int, np.ndarray]
     positions: before and after)."""
     p_WB, q_WB = robot.structure.p_WB.copy(), robot.structure.q_WB.copy()
     for body, angle in angles.items():
-        c, s = np.cos(angle), np.sin(angle)
         before, after = pivots[body]
-        rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-        p_WB[body] = after + rotation @ (p_WB[body] - before)
-        q_WB[body] = [np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0]
+        turn = Rotation.from_euler("y", angle)
+        p_WB[body] = after + turn.apply(p_WB[body] - before)
+        q_WB[body] = np.roll(turn.as_quat(), 1)
     structure = dataclasses.replace(robot.structure, p_WB=p_WB, q_WB=q_WB)
     return dataclasses.replace(robot, structure=structure)
 
@@ -105,7 +105,7 @@ def folded(duration: float = 0.4) -> Robot:
 
 def as_a_double_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
     """Lagrange's equations of two bars, for their angles from the vertical."""
-    problem, (a, b) = PROBLEMS["double_pendulum"], LEANS
+    problem, (a, b) = completed("double_pendulum"), LEANS
     states = problem["states"] | {"a": [a, "a_rate"], "b": [b, "b_rate"]}
     upper, lower = formula(times, problem | {"states": states, "known": "array([a, b])"})
     knee = UPPER * along(upper)
@@ -136,6 +136,4 @@ def as_a_flap(robot: Robot, times: np.ndarray) -> np.ndarray:
     angle = swing(square, times, angle=LEANS[0])
     moved = np.tile(structure.p_WN, (len(times), 1, 1))
     moved[:, structure.node_names.index("e")] = [0.0, 0.0, 1.0] + 0.3 * along(angle)
-    for node in ("a", "b", "c", "d"):
-        moved[:, structure.node_names.index(node)] = [0.0, -0.2 if node in "ac" else 0.2, 1.0]
     return moved

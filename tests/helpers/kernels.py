@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tetra_drake.engines.lanes.dynamics import Solver, implicit_matrix
-from tetra_drake.engines.lanes.ros2 import StepMemory, take_step
+from tetra_drake.engines.lanes.dynamics import Solver, StepMemory, implicit_matrix
+from tetra_drake.engines.lanes.ros2 import take_step
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.lanes import Real, Table
 from tetra_drake.kernels.packed import Packed, allocate, unpacked
@@ -20,8 +20,11 @@ class Stepper:
     def __init__(self, robot: Model) -> None:
         self.solver, self.forces = Solver.of(robot), Forces.of(robot)
         self.robot = robot = self.solver.oriented(robot)
-        blocks = len(self.solver.schedule.later)
-        self.work = allocate(StepMemory, sizes_of(robot) | {"blocks": blocks})
+        sizes = {
+            "blocks": len(self.solver.schedule.later),
+            "signals": 1 + robot.cables.signal.max(),
+        }
+        self.work = allocate(StepMemory, sizes_of(robot) | sizes)
         self.parts: Parts = Packed((robot, self.solver, self.forces, self.work))
 
     def force_at(self, state: np.ndarray, modes: np.ndarray, signals: np.ndarray) -> np.ndarray:
@@ -34,7 +37,8 @@ class Stepper:
         """Moves `work.state` by a step h (s) with signals at its start and end. Returns the
         estimate of its error."""
         compute_force(self.parts, modes, start)
-        error = step_once(self.parts, modes, end, h)
+        self.work.end_signals[:] = end
+        error = step_once(self.parts, modes, h)
         self.work.state[:] = self.work.end
         return error
 
@@ -62,16 +66,16 @@ def written_out(blocks: np.ndarray, schedule: Schedule) -> np.ndarray:
 def compute_force(parts: Parts, modes: Table, signals: Table) -> None:
     robot, _, forces, work = unpacked(parts)
     move_robot(robot, work.state, forces)
-    compute_forces(robot, work.state, modes, signals, True, forces, work.force)
+    compute_forces(robot, work.state, modes, signals, forces, work.force)
 
 
 @compiled
-def step_once(parts: Parts, modes: Table, signals: Table, h: Real) -> Real:
+def step_once(parts: Parts, modes: Table, h: Real) -> Real:
     robot, solver, forces, work = unpacked(parts)
-    return take_step(robot, solver, work, modes, forces, signals, h, False)
+    return take_step(robot, solver, work, modes, forces, h)
 
 
 @compiled
 def write_matrix(parts: Parts, modes: Table, time: Real) -> None:
     robot, solver, forces, work = unpacked(parts)
-    implicit_matrix(robot, solver, work.state, modes, forces, time, work.lines, work.blocks)
+    implicit_matrix(robot, solver, work, modes, forces, time)

@@ -8,8 +8,6 @@ from helpers.states import disturbed
 
 from tetra_drake.laws.capsules import (
     NearStruts,
-    StrutContactLaw,
-    StrutSearch,
     add_contact_force,
     find_near_struts,
 )
@@ -65,8 +63,6 @@ def test_all_pairs_of_struts_within_a_limit_are_found():
     distances = {pair: strut_distance(struts, nodes, *pair) for pair in all_pairs}
     for nearest in [0.0, *distances.values()]:
         limit = nearest + 1e-9
-        search = StrutSearch(near=limit, drift=0.0, passage=0.0, lightest=1.0)
-        law = StrutContactLaw(True, np.array(LAW), np.array(search))
-        find_near_struts(struts, law, structure.radius, state, nodes, near)
+        find_near_struts(struts, limit, structure.radius, state, nodes, near)
         expected = [list(pair) for pair, distance in distances.items() if distance <= limit]
         assert near.pairs[: near.count[0]].tolist() == expected

@@ -98,7 +98,7 @@ def frame_under(centre: np.ndarray, surface: tuple[SurfaceGrid, np.ndarray]) -> 
 def rolled(terrain: Relief, radius: float) -> tuple[SurfaceGrid, np.ndarray]:
     """Rolled surface of a terrain, with its heights."""
     grid = terrain.grid(ahead=0.0, scale=1.0, source="")
-    base = SurfaceGrid.of(grid.heights, grid.corner, grid.cell, terrain.is_stepped)
+    base = SurfaceGrid.of(grid, is_stepped=terrain.is_stepped)
     return rolled_surface(base, grid.heights, radius)
 
 

@@ -19,10 +19,8 @@ import numpy as np
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
 from tetra_drake.errors import (
-    Diverged,
     InputError,
     SimulationFailure,
-    StepBudgetExceeded,
     TimeBudgetExceeded,
 )
 from tetra_drake.evolution.manifest import Method
@@ -131,7 +129,7 @@ class GaitEvaluation:
         try:
             result = simulation()
         except (SimulationFailure, TimeBudgetExceeded) as error:
-            failure = f"{_KINDS[type(error)]}: {error}"
+            failure = f"{error.kind}: {error}"
             return Evaluation(failure=failure, wall_time=error.wall_time)
         except InputError as error:
             if scenario is self.scenario and not scenario.evolve:
@@ -171,14 +169,6 @@ class GaitEvaluation:
                 return float(fitness)
         name = Method.of(self.scenario, objective=self.objective).objective
         raise InputError("objective", name, f"returned {fitness!r:.60}, expected a number")
-
-
-_KINDS: dict[type[Exception], str] = {
-    SimulationFailure: "failed",
-    Diverged: "diverged",
-    StepBudgetExceeded: "step budget",
-    TimeBudgetExceeded: "time budget",
-}
 
 
 def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:

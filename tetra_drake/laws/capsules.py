@@ -41,10 +41,9 @@ from tetra_drake.laws.contact import NormalForce, normal_force
 from tetra_drake.laws.struts import (
     Axes,
     Struts,
-    are_joined,
     axes_of,
+    may_be_near,
     may_be_nearer,
-    midpoint,
     nearest_on_line,
     nearest_on_struts,
     origin,
@@ -128,21 +127,16 @@ def near_sizes(struts: Struts) -> dict[str, int]:
 
 @functools.partial(compiled, nogil=True)  # a call of its own, as searches are rare
 def find_near_struts(
-    struts: Struts,
-    contact: StrutContactLaw,
-    radius: Table,
-    state: Table,
-    nodes: Table,
-    near: NearStruts,
+    struts: Struts, limit: Real, radius: Table, state: Table, nodes: Table, near: NearStruts
 ) -> None:
-    """Lists in `near` the pairs of struts of different bodies that are near each other in any lane
-    (each lane is a robot), except struts with a common joint. Also stores the positions of the
-    nodes there.
+    """Lists in `near` the pairs of struts of different bodies whose axes are at most `limit` (m)
+    apart in any lane (each lane is a robot), except struts with a common joint. Also stores the
+    positions of the nodes there.
 
-    `contact` has the distance below which a pair is near. `radius` (bodies,) are radii of spheres
-    around the bodies. `nodes` is the table of laws.kinematics for a `state` [q; v] (13*bodies,).
+    `radius` (bodies,) are radii of spheres around the bodies. `nodes` is the table of
+    laws.kinematics for a `state` [q; v] (13*bodies,).
     """
-    limit, count = named(StrutSearch, contact.search).near, 0
+    count = 0
     for first in range(radius.size):
         for second in range(first + 1, radius.size):
             offset = difference(origin(state, second), origin(state, first))
@@ -150,12 +144,7 @@ def find_near_struts(
                 continue
             for i in range(struts.first_strut[first], struts.first_strut[first + 1]):
                 for j in range(struts.first_strut[second], struts.first_strut[second + 1]):
-                    offset = difference(midpoint(struts, nodes, i), midpoint(struts, nodes, j))
-                    if not may_be_nearer(
-                        offset, 0.5 * (struts.length[i] + struts.length[j]), limit
-                    ):
-                        continue
-                    if are_joined(struts, i, j):
+                    if not may_be_near(struts, nodes, i, j, limit):
                         continue
                     if any_lane(strut_distance(struts, nodes, i, j) <= limit):
                         near.pairs[count, 0], near.pairs[count, 1] = i, j
@@ -253,35 +242,6 @@ def find_touch(struts: Struts, nodes: Table, i: int, j: int) -> Touch:
     by_v = difference(scaled(turn, axes.u), scaled(t, direction))
     starts = difference(direction, by_u), scaled(-1.0, sum_of(direction, by_v))
     return Touch(s, t, reach - square * per_distance, (starts[0], by_u, starts[1], by_v))
-
-
-@inlined
-def add_strut_forces(
-    struts: Struts,
-    law: StrutContactLaw,
-    radius: Table,
-    state: Table,
-    nodes: Table,
-    near: NearStruts,
-) -> None:
-    """Adds the forces between struts that touch to the forces on the nodes, in `nodes`, which has
-    the nodes' positions and velocities.
-
-    Finds the near pairs anew, into `near`, if a node has moved far since the latest search; see
-    find_near_struts(). `radius` (bodies,) are radii of spheres around the bodies, `state` is [q; v]
-    (13*bodies,).
-    """
-    if not law.acts:
-        return
-    search, normal = named(StrutSearch, law.search), named(NormalForce, law.normal)
-    farthest = 0.0 * search.drift
-    for node in range(near.p_WN.shape[0]):
-        moved = difference(vector_at(nodes, node, kinematics.P_WN), vector_at(near.p_WN, node, 0))
-        farthest = maximum(farthest, dot(moved, moved))
-    if any_lane(farthest > search.drift * search.drift):
-        find_near_struts(struts, law, radius, state, nodes, near)
-    for k in range(near.count[0]):
-        add_contact_force(struts, normal, nodes, near.pairs[k, 0], near.pairs[k, 1])
 
 
 @inlined

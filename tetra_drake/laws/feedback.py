@@ -13,7 +13,7 @@ modes and Forces. A constant of the robot is a field of Senses, which robot.robo
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, named
@@ -105,23 +105,21 @@ def sense(
         feedback[2 * k + 1] = same - differs
 
 
+FeedbackParts: TypeAlias = Packed[tuple[Model, Forces, Senses, Table]]
+"""A robot, its Forces and Senses, and the gains in the order of PATHWAYS, packed for kernels."""
+
+
 @compiled
 def compute_feedback(
-    parts: Packed[tuple[Model, Forces, Senses]],
-    gains: Table,
-    state: Table,
-    modes: Table,
-    signals: Table,
-    drives: Table,
-    feedback: Table,
+    parts: FeedbackParts, state: Table, modes: Table, signals: Table, drives: Table, feedback: Table
 ) -> None:
     """Computes the forces of a robot, then writes the feedback of each neuron to `feedback` (2m,);
     see sense().
 
-    `parts` is a Model, its Forces and its Senses. `gains` are in the order of PATHWAYS, `state` is
-    [q; v] (13*bodies,), `modes` (contacts, 12) are contact and friction modes, `signals` (m,) are
-    in N, `drives` (drives,) are the actuators' states. Also writes the forces to the Forces.
+    `state` is [q; v] (13*bodies,), `modes` (contacts, 12) are contact and friction modes, `signals`
+    (m,) are in N, `drives` (drives,) are the actuators' states. Also writes the forces to the
+    Forces of `parts`.
     """
-    robot, forces, senses = unpacked(parts)
+    robot, forces, senses, gains = unpacked(parts)
     compute_forces_at(robot, state, modes, signals, drives, forces)
     sense(senses, gains, state, modes, forces, feedback)

@@ -8,9 +8,10 @@ from typing import Annotated, NamedTuple, Self, TypeAlias
 import numpy as np
 
 from tetra_drake.kernels.compiling import compiled, inlined
-from tetra_drake.kernels.lanes import Real, Table, any_lane, inverse_sqrt, maximum, select
+from tetra_drake.kernels.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named, select
 from tetra_drake.kernels.packed import Packed, allocate, unpacked
 from tetra_drake.laws import actuator, cable, capsules, contact, dry_friction, kinematics, terrain
+from tetra_drake.laws.contact import NormalForce
 from tetra_drake.laws.friction import friction_force
 from tetra_drake.laws.inertia import INERTIA_COLUMNS, times_inertia, turn_inertia
 from tetra_drake.laws.model import Model
@@ -137,13 +138,12 @@ def pull_of_cable(
 
 
 @inlined
-def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
+def add_cable_forces(robot: Model, signals: Table, forces: Forces) -> None:
     """Adds the forces of all cables to the forces on the nodes, in `forces.nodes`, which has the
     nodes' positions and velocities.
 
     `signals` (signals,) are in N. Also writes the rates of the actuators' states to
-    `forces.drives`, and with `write_parts` direction, length and tension of each cable to
-    `forces.cable_forces`.
+    `forces.drives`, and direction, length and tension of each cable to `forces.cable_forces`.
     """
     nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
     routes = robot.cables.routes
@@ -155,12 +155,11 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
         tension, tension_per_rate = pull_of_cable(robot, i, length, rate, signals, drives)
         add_vector(scaled(tension, direction), a, kinematics.FORCE, nodes)
         add_vector(scaled(-tension, direction), b, kinematics.FORCE, nodes)
-        if write_parts:
-            put_vector(direction, i, cable.DIRECTION, parts)
-            parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
-            parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
+        put_vector(direction, i, cable.DIRECTION, parts)
+        parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
+        parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
     if routes.nodes.size:
-        add_routed_cables(robot, signals, write_parts, forces)
+        add_routed_cables(robot, signals, forces)
 
 
 @inlined
@@ -185,7 +184,7 @@ def span(nodes: Table, a: int, b: int) -> tuple[Vector3, Real, Real]:
 
 
 @functools.partial(compiled, nogil=True)  # a call of its own: inlined, it slows other robots
-def add_routed_cables(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
+def add_routed_cables(robot: Model, signals: Table, forces: Forces) -> None:
     """Adds the forces of the cables that run over rings; see add_cable_forces(). Also writes
     `forces.route_slopes` and `forces.rings`."""
     nodes, routes, slopes = forces.nodes, robot.cables.routes, forces.route_slopes
@@ -208,10 +207,9 @@ def add_routed_cables(robot: Model, signals: Table, write_parts: bool, forces: F
             add_vector(pull, routes.nodes[k], kinematics.FORCE, nodes)
         if any_lane(robot.cables.law.mu[i] > 0.0):
             add_ring_friction(robot, i, length, rate, maximum(tension, 0.0), forces)
-        if write_parts:
-            put_vector(scaled(-1.0, vector_at(slopes, first, 0)), i, cable.DIRECTION, parts)
-            parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
-            parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
+        put_vector(scaled(-1.0, vector_at(slopes, first, 0)), i, cable.DIRECTION, parts)
+        parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
+        parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
 
 
 @inlined
@@ -286,51 +284,40 @@ def joint_spin(robot: Model, state: Table, i: int) -> Vector3:
 
 
 @inlined
-def add_ground_forces(
-    robot: Model, state: Table, modes: Table, write_parts: bool, forces: Forces
-) -> None:
-    """Adds the forces of the ground to the forces on nodes and round feet, in `forces.nodes`.
+def add_ground_forces(robot: Model, state: Table, modes: Table, forces: Forces) -> None:
+    """Adds the forces of the ground to the forces on nodes and round feet, in `forces.nodes`. Also
+    writes friction and normal force of each contact to `forces.ground_forces`.
 
     `state` is [q; v] (13*bodies,). `modes` (contacts, 12) says which nodes touch and stick, and is
-    only read; see laws.contact. With `write_parts`, also writes friction and normal force of each
-    contact to `forces.ground_forces`. move_contacts() must have been called for the same state.
+    only read; see laws.contact. move_contacts() must have been called for the same state.
     """
     ground, nodes, frames, parts = robot.ground, forces.nodes, forces.frames, forces.ground_forces
     for i in range(parts.shape[0]):
         touches = modes[i, contact.CONTACT] != 0.0
         if not any_lane(touches | (contact.gap(nodes, ground, frames, i) <= 0.0)):
-            if write_parts:
-                put_vector((0.0, 0.0, 0.0), i, contact.FRICTION_1, parts)
+            put_vector((0.0, 0.0, 0.0), i, contact.FRICTION_1, parts)
             continue
         slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
         f_1, f_2 = friction_force(ground.friction, slide)
         f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
-        if write_parts:
-            put_vector((f_1, f_2, slide.normal), i, contact.FRICTION_1, parts)
+        put_vector((f_1, f_2, slide.normal), i, contact.FRICTION_1, parts)
         force = terrain.to_world(f_1, f_2, slide.normal, frames, i, ground.flat)
         add_vector(force, ground.contacts[i], kinematics.FORCE, nodes)
 
 
 @inlined
 def compute_forces(
-    robot: Model,
-    state: Table,
-    modes: Table,
-    signals: Table,
-    write_parts: bool,
-    forces: Forces,
-    generalized: Table,
+    robot: Model, state: Table, modes: Table, signals: Table, forces: Forces, generalized: Table
 ) -> None:
     """Writes the generalized force of cables, ground, touching struts, anchors, loads, gravity and
     gyroscopic torques to `generalized` (6*bodies,): torque and force [t_W; f_W] at each body's
-    origin.
+    origin. Also writes `forces.cable_forces` and `forces.ground_forces`.
 
     move_robot() must have been called for the same `state`. `modes` (contacts, 12) are the contact
-    and friction modes, and are only read. `signals` are in N. With `write_parts`, also writes
-    `forces.cable_forces` and `forces.ground_forces`.
+    and friction modes, and are only read. `signals` are in N.
     """
-    add_cable_forces(robot, signals, write_parts, forces)
-    add_ground_forces(robot, state, modes, write_parts, forces)
+    add_cable_forces(robot, signals, forces)
+    add_ground_forces(robot, state, modes, forces)
     add_state_forces(robot, state, forces)
     gather_forces(robot, forces.nodes, generalized)
     if robot.joints.node_a.size:
@@ -372,8 +359,7 @@ def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
     (constant forces) to the forces on the nodes, in `forces.nodes`. They need neither signals nor
     modes. `state` is [q; v] (13*bodies,)."""
     nodes, anchors, joints, loads = forces.nodes, robot.anchors, robot.joints, robot.loads
-    radius, law, near = robot.bodies.radius, robot.strut_contact, forces.near_struts
-    capsules.add_strut_forces(robot.struts, law, radius, state, nodes, near)
+    add_strut_forces(robot, state, forces)
 
     for i in range(anchors.nodes.size):
         node = anchors.nodes[i]
@@ -396,6 +382,30 @@ def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
         add_vector(vector_at(loads.forces, i, 0), loads.nodes[i], kinematics.FORCE, nodes)
 
 
+@inlined
+def add_strut_forces(robot: Model, state: Table, forces: Forces) -> None:
+    """Adds the forces between struts that touch to the forces on the nodes, in `forces.nodes`,
+    which has the nodes' positions and velocities. `state` is [q; v] (13*bodies,).
+
+    Finds the near pairs anew, into `forces.near_struts`, if a node has moved far since the latest
+    search; see capsules.find_near_struts().
+    """
+    law, nodes, near = robot.strut_contact, forces.nodes, forces.near_struts
+    if not law.acts:
+        return
+    search, normal = named(capsules.StrutSearch, law.search), named(NormalForce, law.normal)
+    farthest = 0.0 * search.drift
+    for node in range(near.p_WN.shape[0]):
+        moved = difference(vector_at(nodes, node, kinematics.P_WN), vector_at(near.p_WN, node, 0))
+        farthest = maximum(farthest, dot(moved, moved))
+    if any_lane(farthest > search.drift * search.drift):
+        radius = robot.bodies.radius
+        capsules.find_near_struts(robot.struts, search.near, radius, state, nodes, near)
+    for k in range(near.count[0]):
+        i, j = near.pairs[k, 0], near.pairs[k, 1]
+        capsules.add_contact_force(robot.struts, normal, nodes, i, j)
+
+
 @compiled
 def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> float:
     """Writes the generalized force of all cables to `generalized` (6*bodies,): torque and force
@@ -408,7 +418,7 @@ def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
-    add_cable_forces(robot, signals, True, forces)
+    add_cable_forces(robot, signals, forces)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
     total = 0.0
     for i in range(generalized.size):
@@ -427,7 +437,7 @@ def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized:
     """
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
-    add_ground_forces(robot, state, modes, True, forces)
+    add_ground_forces(robot, state, modes, forces)
     gather_forces(robot, forces.nodes, generalized)
 
 
@@ -460,7 +470,7 @@ def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized
     robot, forces = unpacked(parts)
     nodes, law, near = forces.nodes, robot.strut_contact, forces.near_struts
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, nodes)
-    capsules.add_strut_forces(robot.struts, law, robot.bodies.radius, state, nodes, near)
+    add_strut_forces(robot, state, forces)
     kinematics.gather_forces(nodes, robot.first_node, generalized)
     return capsules.time_to_pass(robot.struts, law, nodes, near, horizon)
 
@@ -475,40 +485,26 @@ def forces_of_motion(
     `nodes` (k, nodes, NODE_COLUMNS), without the lowest points of round feet, `cable_forces` (k,
     cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
     """
-    forces, samples = Forces.of(robot), len(states)
-    nodes = np.empty((samples, len(robot.p_BN), kinematics.NODE_COLUMNS))
-    cable_forces = np.empty((samples, *forces.cable_forces.shape))
-    ground_forces = np.empty((samples, *forces.ground_forces.shape))
-    given = states, modes, signals, drives
-    forces_along(Packed((robot, forces)), *given, nodes, cable_forces, ground_forces)
-    return nodes, cable_forces, ground_forces
+    return forces_along(Packed((robot, Forces.of(robot))), states, modes, signals, drives)
 
 
 @compiled
 def forces_along(
-    parts: Parts,
-    states: Table,
-    modes: Table,
-    signals: Table,
-    drives: Table,
-    nodes: Table,
-    cable_forces: Table,
-    ground_forces: Table,
-) -> None:
-    """Writes the last three arguments, the tables of forces_of_motion(), at each of the k times of
-    a recorded motion.
-
-    `parts` is a Model and its Forces. The motion has states [q; v] (k, 13*bodies), contact and
-    friction modes (k, contacts, MODE_COLUMNS), signals (k, m) in N, and actuator states `drives`
-    (k, drives). Written are `nodes` (k, nodes, NODE_COLUMNS), `cable_forces` (k, cables,
-    CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
-    """
+    parts: Parts, states: Table, modes: Table, signals: Table, drives: Table
+) -> tuple[Table, Table, Table]:
+    """The tables of forces_of_motion(); `parts` is a Model and its Forces, the other arguments are
+    the same."""
     robot, forces = unpacked(parts)
-    for k in range(states.shape[0]):
+    samples, contacts = states.shape[0], modes.shape[1]
+    nodes = np.empty((samples, robot.p_BN.shape[0], kinematics.NODE_COLUMNS))
+    cable_forces = np.empty((samples, forces.cable_forces.shape[0], cable.CABLE_FORCE_COLUMNS))
+    ground_forces = np.empty((samples, contacts, contact.GROUND_FORCE_COLUMNS))
+    for k in range(samples):
         compute_forces_at(robot, states[k], modes[k], signals[k], drives[k], forces)
         copy_rows(forces.nodes, nodes[k])
         copy_rows(forces.cable_forces, cable_forces[k])
         copy_rows(forces.ground_forces, ground_forces[k])
+    return nodes, cable_forces, ground_forces
 
 
 @inlined
@@ -521,7 +517,7 @@ def compute_forces_at(
     move_robot(robot, state, forces)
     for i in range(drives.size):
         forces.drives[i, actuator.DRIVE] = drives[i]
-    compute_forces(robot, state, modes, signals, True, forces, generalized)
+    compute_forces(robot, state, modes, signals, forces, generalized)
 
 
 @inlined

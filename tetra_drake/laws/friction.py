@@ -339,19 +339,8 @@ def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
     direction of slip. `slide` is the node's motion at the end of the step, with the modes of the
     step."""
     breaks_1, breaks_2 = breaks_free(slide.t1, law), breaks_free(slide.t2, law)
-    share_1 = share_2 = 0.0 * law.joint
-    if any_lane(law.joint != 0.0):  # deflections that are held along the other tangent
-        per_range = law.joint / law.stiction_range
-        share_1 = select(breaks_2, per_range * slide.t1.deflection, 0.0)
-        share_2 = select(breaks_1, per_range * slide.t2.deflection, 0.0)
-    mode_1 = next_tangent_mode(slide.t1, breaks_1, share_1)
-    mode_2 = next_tangent_mode(slide.t2, breaks_2, share_2)
-    moved_1, moved_2 = restarted(slide.t1, law), restarted(slide.t2, law)
-    begins_1 = (mode_1 == STICK) & ((slide.t1.mode != STICK) | (moved_1 != 0.0))
-    begins_2 = (mode_2 == STICK) & ((slide.t2.mode != STICK) | (moved_2 != 0.0))
-    kept = law.kept * law.stiction_range
-    bend_1 = select(slide.t1.mode == STICK, slide.t1.deflection - moved_1, kept * slide.t1.mode)
-    bend_2 = select(slide.t2.mode == STICK, slide.t2.deflection - moved_2, kept * slide.t2.mode)
+    mode_1, begins_1, bend_1 = next_tangent_mode(slide.t1, breaks_1, breaks_2, law)
+    mode_2, begins_2, bend_2 = next_tangent_mode(slide.t2, breaks_2, breaks_1, law)
     return NextMode((mode_1, mode_2), (begins_1, begins_2), (bend_1, bend_2))
 
 
@@ -366,18 +355,29 @@ def breaks_free(slide: TangentSlide, law: ResetConstants) -> Truth:
 
 
 @inlined
-def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
-    """Mode of the reset integrator along one tangent after a step: 0 sticks, otherwise the sign of
-    slip.
+def next_tangent_mode(
+    slide: TangentSlide, breaks: Truth, other_breaks: Truth, law: ResetConstants
+) -> tuple[Real, Truth, Real]:
+    """Mode of the reset integrator along one tangent after a step, whether the node begins to stick
+    along it, and the deflection (m) then; see NextMode.
 
     `breaks` is true if the node breaks free along this tangent: it then slips in the direction of
-    its velocity. If it breaks free along the other tangent only, its mode here is `share`, a
-    fraction of slip: the deflection along this tangent divided by the stiction range. `share` is 0
-    otherwise. A slipping node sticks again when its velocity changes sign.
+    its velocity. If it breaks free along the other tangent only, a law with `joint` lets it slip
+    here by a share, the deflection along this tangent divided by the stiction range. A slipping
+    node sticks again when its velocity changes sign.
     """
+    share = 0.0 * law.joint
+    if any_lane(law.joint != 0.0):
+        per_range = law.joint / law.stiction_range
+        share = select(other_breaks, per_range * slide.deflection, 0.0)
+    sticks = slide.mode == STICK
     from_stick = select(breaks, select(slide.velocity > 0.0, 1.0, -1.0), share)
-    mode = select(slide.mode == STICK, from_stick, slide.mode)
-    return select(mode * slide.velocity > 0.0, mode, STICK)
+    mode = select(sticks, from_stick, slide.mode)
+    mode = select(mode * slide.velocity > 0.0, mode, STICK)
+    moved = restarted(slide, law)
+    begins = (mode == STICK) & (not_(sticks) | (moved != 0.0))
+    kept = law.kept * law.stiction_range * slide.mode
+    return mode, begins, select(sticks, slide.deflection - moved, kept)
 
 
 @inlined

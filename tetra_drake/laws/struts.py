@@ -160,6 +160,16 @@ def may_be_nearer(offset: Vector3, reach: Real, least: Real) -> bool:
 
 
 @inlined
+def may_be_near(struts: Struts, nodes: Table, i: int, j: int, least: Real) -> bool:
+    """Quick test of two struts: False if a joint holds them together, or their axes are surely
+    farther apart than `least` (m) in all lanes. `nodes` is the table with the positions of the
+    nodes."""
+    apart = difference(midpoint(struts, nodes, i), midpoint(struts, nodes, j))
+    reach = 0.5 * (struts.length[i] + struts.length[j])
+    return may_be_nearer(apart, reach, least) and not are_joined(struts, i, j)
+
+
+@inlined
 def least_strut_distance(
     struts: Struts, radius: Table, first_node: Table, state: Table, nodes: Table, least: Real
 ) -> Real:
@@ -185,10 +195,7 @@ def least_strut_distance(
                 # Along the offset, the strut may end long before the second body begins.
                 if not any_lane(begin - maximum(end_a, end_b) <= MARGIN * least * length):
                     continue
-                midpoint_a = midpoint(struts, nodes, a)
                 for b in range(struts.first_strut[second], struts.first_strut[second + 1]):
-                    apart = difference(midpoint_a, midpoint(struts, nodes, b))
-                    reach = 0.5 * (struts.length[a] + struts.length[b])
-                    if may_be_nearer(apart, reach, least) and not are_joined(struts, a, b):
+                    if may_be_near(struts, nodes, a, b, least):
                         least = minimum(least, strut_distance(struts, nodes, a, b))
     return least

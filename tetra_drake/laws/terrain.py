@@ -21,7 +21,6 @@ plane), and t2 = n x t1. On flat ground the axes are the world's, and `frames` i
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, NamedTuple, Self
@@ -58,6 +57,18 @@ MOST_TRIALS, NEAR = 24, 1e-7
 """Most places that nearest_plane() tries, and its last step as a share of the depth."""
 
 
+@dataclass(frozen=True)
+class Grid:
+    """Heights of a terrain on a regular grid: the control points of the surface."""
+
+    heights: np.ndarray
+    """Heights (rows, columns) in m. Rows are along x, columns along y."""
+    corner: tuple[float, float]
+    """Coordinates x and y of heights[0, 0], in m."""
+    cell: tuple[float, float]
+    """Distances between heights along x and y, in m."""
+
+
 class SurfaceGrid(NamedTuple):
     """Position and size of the grid of control points of the ground's surface; SI units."""
 
@@ -83,25 +94,19 @@ class SurfaceGrid(NamedTuple):
     """Largest radius of a foot."""
 
     @classmethod
-    def of(
-        cls,
-        heights: np.ndarray,
-        corner: Sequence[float],
-        cell: Sequence[float] | np.ndarray,
-        is_stepped: bool,
-    ) -> Self:
-        """The grid of control points with these heights (rows, columns); all in m, see Grid."""
+    def of(cls, grid: Grid, *, is_stepped: bool = False) -> Self:
+        """Position and size of a grid of control points."""
         inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding
         return cls(
-            corner_x=corner[0],
-            corner_y=corner[1],
-            per_cell_x=1.0 / cell[0],
-            per_cell_y=1.0 / cell[1],
-            last_row=heights.shape[0] - inside,
-            last_column=heights.shape[1] - inside,
-            columns=heights.shape[1],
+            corner_x=grid.corner[0],
+            corner_y=grid.corner[1],
+            per_cell_x=1.0 / grid.cell[0],
+            per_cell_y=1.0 / grid.cell[1],
+            last_row=grid.heights.shape[0] - inside,
+            last_column=grid.heights.shape[1] - inside,
+            columns=grid.heights.shape[1],
             first=0.0,
-            top=heights.max(),
+            top=grid.heights.max(),
             is_stepped=float(is_stepped),
             reach=0.0,
         )
@@ -309,10 +314,11 @@ def rolled_surface(
         heights = heights.repeat(copies, axis=0)  # sharp edges
         sharp = sizes / [copies, 1.0]
         corner = x[0] - 0.5 * (copies - 1) * sharp[0], y[0]
-        grid = SurfaceGrid.of(heights, corner, sharp, is_stepped=False)
+        grid = SurfaceGrid.of(Grid(heights, corner, (sharp[0], sharp[1])))
     rolled = np.empty((x.size, y.size))
     roll(x, y, ball, grid, np.ascontiguousarray(heights).ravel(), rolled)
-    return SurfaceGrid.of(rolled, (x[0], y[0]), sizes / n, is_stepped=False), rolled.ravel()
+    cell = sizes / n
+    return SurfaceGrid.of(Grid(rolled, (x[0], y[0]), (cell[0], cell[1]))), rolled.ravel()
 
 
 @compiled
@@ -339,18 +345,6 @@ HIGHEST = 1e6
 """Largest height (m). Larger numbers would leave too few digits for the robot's motion."""
 MOST_CELLS = 4_000_000
 STEEPEST = math.radians(60.0)
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Heights of a terrain on a regular grid: the control points of the surface."""
-
-    heights: np.ndarray
-    """Heights (rows, columns) in m. Rows are along x, columns along y."""
-    corner: tuple[float, float]
-    """Coordinates x and y of heights[0, 0], in m."""
-    cell: tuple[float, float]
-    """Distances between heights along x and y, in m."""
 
 
 def fault_of_heights(heights: np.ndarray) -> str:

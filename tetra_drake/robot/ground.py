@@ -107,8 +107,7 @@ def make_surface(
         fault = f"cells of {grid.cell} m"
     if fault:
         raise InputError(source, "grid", f"has {fault}")
-    is_stepped = terrain_kind.is_stepped
-    surface_grid = terrain.SurfaceGrid.of(grid.heights, grid.corner, grid.cell, is_stepped)
+    surface_grid = terrain.SurfaceGrid.of(grid, is_stepped=terrain_kind.is_stepped)
     return Ground(
         normal=np.array(NormalForce(ground.stiffness, ground.damping)),
         friction=friction.law(),

@@ -33,8 +33,7 @@ def strut_contact_law(scenario: World, structure: Structure) -> StrutContactLaw:
     kernels check none."""
     lightest, radii = structure.mass.min(), structure.strut_radius
     if not radii.size:
-        search = StrutSearch(0.0, drift=0.0, passage=0.0, lightest=lightest)
-        return scenario.strut_contact.law(search)._replace(acts=False)
+        return StrutContactLaw()
     skin = SKIN * structure.strut_table.length.min()
     near, passage = 2.0 * radii.max() + skin, PASSAGE * radii.min()
     search = StrutSearch(near, drift=0.25 * skin, passage=passage, lightest=lightest)
@@ -76,7 +75,8 @@ def overlaps(
         weight = float(structure.mass.sum()) * scenario.robot.gravity
         allowed += weight / NormalForce(*contact.normal).stiffness
     near, nodes = NearStruts.of(struts), moved_nodes(structure, state)
-    find_near_struts(struts, contact, structure.radius, state, nodes, near)
+    limit = StrutSearch(*contact.search).near
+    find_near_struts(struts, limit, structure.radius, state, nodes, near)
     found = {}
     for i, j in near.pairs[: near.count[0]].tolist():
         depth = find_touch(struts, nodes, i, j).depth

@@ -25,6 +25,8 @@ class EngineSettings(Section):
     has_cone: ClassVar[bool] = False
     """True if the engine replaces some friction laws by MuJoCo's friction; see
     FrictionKind.cone_text."""
+    most_signals: ClassVar[int] = 100_000_000
+    """Largest number of values of all signals in one simulation; they need about 3 GB."""
 
 
 class Drake(EngineSettings):
@@ -34,6 +36,7 @@ class Drake(EngineSettings):
     """
 
     module: ClassVar[str] = "tetra_drake.engines.drake"
+    most_signals: ClassVar[int] = 20_000_000
     scheme: Literal["radau3", "runge_kutta3"] | None = None
     """Implicit (radau3) or explicit (runge_kutta3) integrator. By default radau3 for n up to 12
     bodies; for more runge_kutta3, unless dampers stop the fastest motion at a rate above 14 n² per

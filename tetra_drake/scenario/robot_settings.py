@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import operator
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Self
 
 import pydantic
 from pydantic import Field
 
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.start import Start
-from tetra_drake.scenario.tolerances import Tolerances, split_tolerances
+from tetra_drake.scenario.tolerances import Tolerances, check_tolerances, split_tolerances
 from tetra_drake.settings.quantities import Acceleration, Position
 from tetra_drake.settings.section import Kinds, Section, Tree
 
@@ -40,6 +40,11 @@ class RobotSettings(Section):
     in the text of a number: `200 N/m ± 2 %`. td.predict and td.fit use them."""
 
     _split = pydantic.model_validator(mode="before")(split_tolerances)
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Self:
+        self.blueprint().check_sizes()
+        return check_tolerances(self)
 
     def blueprint(self) -> Blueprint:
         """The robot as plain data."""

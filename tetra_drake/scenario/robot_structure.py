@@ -588,7 +588,7 @@ class StructureFile(RobotSettings):
         self.pinned.clear()
 
     @pydantic.model_validator(mode="after")
-    def _check(self) -> StructureFile:
+    def _check(self) -> Self:
         """Replaces `pinned` by joints. Refuses unknown names, members that are there twice, nodes
         that hang on nothing, and two entries for one body. Then checks what holds for any robot,
         see Blueprint.check()."""
@@ -714,8 +714,3 @@ class ParametricRobot(RobotSettings):
         made = structure.blueprint()
         moved = np.array(self.offsets or made.offsets)
         return dataclasses.replace(made, offsets=moved, start=self.start or made.start)
-
-    @pydantic.model_validator(mode="after")
-    def _check(self) -> Self:
-        self.blueprint().check_sizes()
-        return check_tolerances(self)

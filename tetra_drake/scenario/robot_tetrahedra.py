@@ -12,7 +12,6 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.robot_settings import RobotSettings
-from tetra_drake.scenario.tolerances import check_tolerances
 from tetra_drake.settings.quantities import (
     Damping,
     Density,
@@ -110,8 +109,6 @@ class Tetrahedra(RobotSettings):
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )
     """Groups of a junction's cables that share an oscillator."""
-
-    _check_known = model_validator(mode="after")(check_tolerances)
 
     @property
     def size(self) -> float:
@@ -224,8 +221,7 @@ class Tetrahedra(RobotSettings):
         return far
 
     @model_validator(mode="after")
-    def _check(self) -> Tetrahedra:
-        self.blueprint().check_sizes()
+    def _check_actuation(self) -> Tetrahedra:
         cables = [cable for group in self.actuation for cable in group]
         for cable in cables:
             if cables.count(cable) > 1:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
-from typing import Annotated, NamedTuple, Protocol, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 from tetra_drake.settings.quantities import TWO
 
@@ -12,20 +12,6 @@ NodeT = TypeVar("NodeT", bound=Hashable)
 
 Pair = Annotated[list[str], TWO]
 """Names of two nodes."""
-
-
-class HasPairs(Protocol):
-    """Group of struts or cables."""
-
-    @property
-    def pairs(self) -> list[list[str]]: ...
-
-
-class HasNodes(Protocol):
-    """Entry of a structure file that lists nodes."""
-
-    @property
-    def nodes(self) -> list[str]: ...
 
 
 class Member(NamedTuple):
@@ -43,16 +29,17 @@ class Member(NamedTuple):
         return " ".join((self.group, *self.nodes)), " ".join((self.group, *self.nodes[::-1]))
 
 
-def members(key: str, groups: Mapping[str, HasPairs]) -> Iterator[Member]:
-    """Struts or cables in the order of the file. `key` is their section, such as "struts"."""
+def members(key: str, groups: Mapping[str, Any]) -> Iterator[Member]:
+    """Struts or cables of `groups`, a section of the file, in the order of the file. `key` is the
+    section, such as "struts"."""
     for name, group in groups.items():
         for place, nodes in enumerate(group.pairs):
             yield Member(f"{key}.{name}.pairs[{place}]", name, tuple(nodes))
 
 
-def nodes_of(key: str, entries: Mapping[str, HasNodes]) -> Iterator[tuple[str, str]]:
-    """Keys and names of the nodes that the entries of a section list, such as "joints.j.nodes[0]"
-    and "a". `key` is the section."""
+def nodes_of(key: str, entries: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Keys and names of the nodes that entries list, such as "joints.knee.nodes[0]" and "a". `key`
+    is their section, such as "joints"."""
     for name, entry in entries.items():
         for place, node in enumerate(entry.nodes):
             yield f"{key}.{name}.nodes[{place}]", node

@@ -30,10 +30,6 @@ from tetra_drake.settings.units import SYSTEMS, Units, current, fitting
 
 EngineT = TypeVar("EngineT", Drake, Compiled, Mujoco)
 
-MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
-"""Largest number of values of all signals in one simulation, on Drake and on other engines. They
-need about 3 GB."""
-
 CHANGEABLE = "friction.", "ground."
 """First parts of the keys whose numbers an event may change."""
 
@@ -244,9 +240,7 @@ class World(Section):
             refuse("simulation.control_period", f"found {simulation.control_period} s, {expected}")
 
         blueprint = self.robot.blueprint()
-        is_drake = isinstance(self.engine, Drake)
-        most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
-        least_step = simulation.duration * blueprint.signals / most_signals
+        least_step = simulation.duration * blueprint.signals / self.engine.most_signals
         least_sample = simulation.duration * len(blueprint.bodies) / MOST_SAMPLES
         for key, period, least in (
             ("cpg.listing_step", step, least_step),

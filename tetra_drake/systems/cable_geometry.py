@@ -23,12 +23,12 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     LeafSystem_,
-    System,
     SystemScalarConverter,
 )
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from tetra_drake.robot.structure import PASSIVE_COLOUR
+from tetra_drake.systems.cable_network import CableNetwork
 
 PIECES, SHARE = 4, 0.4
 """Number of cylinders that show a cable, and their length divided by the cable's length at the
@@ -95,20 +95,14 @@ class Cylinders(NamedTuple):
 
 
 def AddCableGeometry(
-    builder: DiagramBuilder,
-    scene_graph: SceneGraph,
-    cables: System,
-    pieces: Mapping[str, Sequence[float]],
+    builder: DiagramBuilder, scene_graph: SceneGraph, cables: CableNetwork, lengths: np.ndarray
 ) -> None:
-    """Shows the cables of a CableNetwork in a scene. `pieces` has the lengths (m) of each cable's
-    straight pieces at the start, by the name of the cable."""
-    lengths = {
-        name if len(each) == 1 else f"{name} {number}": length
-        for name, each in pieces.items()
-        for number, length in enumerate(each, 1)
-    }
+    """Shows cables in a scene. `lengths` (pieces,) in m are those of their straight pieces at the
+    start."""
     source = scene_graph.RegisterSource(cables.get_name())
-    cylinders = RegisterCylinders(scene_graph, source, lengths=lengths)
+    cylinders = RegisterCylinders(
+        scene_graph, source, lengths=dict(zip(cables.pieces, lengths.tolist(), strict=True))
+    )
     name = f"{cables.get_name()}_geometry"
     shown = builder.AddNamedSystem(name, CableGeometry_[float](cylinders))
     builder.Connect(cables.GetOutputPort("ends"), shown.get_input_port())

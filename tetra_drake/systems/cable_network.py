@@ -18,7 +18,6 @@ from pydrake.systems.framework import BasicVector, Context, DiagramBuilder
 from pydrake.systems.primitives import Integrator
 
 from tetra_drake.errors import InputError, SimulationFailure, check_type
-from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import actuator, cable, kinematics
 from tetra_drake.laws.actuator import Actuation, ActuatorKind, DrivenCables, Force
@@ -29,6 +28,7 @@ from tetra_drake.systems.attachment import (
     Attach,
     DeclareOutput,
     Nodes,
+    bound,
     check_constants,
     check_frame,
     check_host,
@@ -79,6 +79,13 @@ class CableNetwork(ConvertibleSystem):
         signals, not the signals themselves."""
         super().__init__()
         self._names, own = names, model.cables.law
+        counts = np.diff(model.cables.routes.first).clip(2) - 1
+        self.pieces = [
+            name if count == 1 else f"{name} {number}"
+            for name, count in zip(names, counts.tolist(), strict=True)
+            for number in range(1, count + 1)
+        ]
+        """Names of the straight pieces of the cables."""
         self._curve = own.curve
         # A copy, which a context may replace.
         self._constants = np.concatenate([*own[:-1], own.curve.rows.ravel()])
@@ -92,11 +99,10 @@ class CableNetwork(ConvertibleSystem):
         bodies, count = model.bodies.mass.size, model.cables.signal.size
         # The kernel writes to these arrays at every call.
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
-        self._parts = Packed((model, self._forces))
-        state, self._no_signals = np.empty(13 * bodies), np.zeros(signals)
-        self._ends = model.cables.pieces
-        self._compute_forces = machine_code(
-            compute_cable_forces, self._parts, state, self._no_signals, self._force
+        parts, state = Packed((model, self._forces)), np.empty(13 * bodies)
+        self._no_signals, self._ends = np.zeros(signals), model.cables.pieces
+        self._compute_forces = bound(
+            compute_cable_forces, parts, state, self._no_signals, self._force
         )
         self._state = self.DeclareVectorInputPort("state", state.size)
         motion = {self._state.ticket()}
@@ -145,16 +151,14 @@ class CableNetwork(ConvertibleSystem):
         numbers.append(numbers_for_each("SetLaw", "curve", curve, count=own.rows.size))
         context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(numbers))
 
-    def _table(
-        self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
-    ) -> np.ndarray:
-        """The numbers of the port `cable_forces` as a table (cables, 7). Writes the generalized
-        force to `force` (6*n,), if given.
+    def _table(self, context: Context, *, moves_only: bool = False) -> np.ndarray:
+        """The numbers of the port `cable_forces` as a table (cables, 7). Also computes the
+        generalized force.
 
         With `moves_only`, the inputs other than the state are not read: only lengths and rates are
         valid. Raises SimulationFailure if a number of a cable is not finite although the state is.
         """
-        signals, force = self._no_signals, self._force if force is None else force
+        signals = self._no_signals
         if self._has_parameters:
             self._constants[:] = context.get_numeric_parameter(0).value()
         if self._drives is not None and not moves_only:
@@ -162,7 +166,7 @@ class CableNetwork(ConvertibleSystem):
         if self._signals is not None and not moves_only:
             signals = self._signals.Eval(context)
         state, table = self._state.Eval(context), self._forces.cable_forces
-        total = self._compute_forces(self._parts, state, signals, force)
+        total = self._compute_forces(state, signals, self._force)
         if self.warns and not moves_only:
             self._warn(table)
         if math.isfinite(total) or not np.isfinite(state).all():
@@ -181,7 +185,8 @@ class CableNetwork(ConvertibleSystem):
             warnings.warn(f"{told}; see actuation of AddCables", RuntimeWarning, stacklevel=2)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._table(context, output.get_mutable_value())
+        self._table(context)
+        output.SetFromVector(self._force)
 
     def _ends_of_pieces(self, context: Context) -> np.ndarray:
         self._table(context, moves_only=True)
@@ -300,17 +305,30 @@ def AddCables(
     )
     network = CableNetwork(model, names=names, signals=len(actuated), parameters=parameters)
     network.warns = warns and slack and not len(starts) and driven.size > 0
-    builder.AddNamedSystem(name, network)
-    Attach(builder, plant, network)
-    if len(starts):
-        actuators = builder.AddNamedSystem(f"{name}_actuators", Integrator(starts))
-        builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
-        builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
+    AddNetwork(builder, plant, network, drives=starts, name=name)
     if scene_graph is not None and names:
         from tetra_drake.systems.cable_geometry import AddCableGeometry
 
-        AddCableGeometry(builder, scene_graph, network, dict(zip(names, pieces, strict=True)))
+        AddCableGeometry(builder, scene_graph, network, np.concatenate(pieces))
     return network
+
+
+def AddNetwork(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    network: CableNetwork,
+    *,
+    drives: np.ndarray,
+    name: str = "cables",
+) -> None:
+    """Attaches a CableNetwork to a plant, and adds the integrator of its actuators, whose states at
+    t = 0 are `drives`."""
+    builder.AddNamedSystem(name, network)
+    Attach(builder, plant, network)
+    if len(drives):
+        actuators = builder.AddNamedSystem(f"{name}_actuators", Integrator(drives))
+        builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
+        builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
 
 
 def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:

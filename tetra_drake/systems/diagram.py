@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from types import NoneType
 
 import numpy as np
@@ -11,7 +11,6 @@ import numpy.typing as npt
 from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.lcm import DrakeLcmParams
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import (
     Context,
     Diagram,
@@ -30,10 +29,10 @@ from tetra_drake.laws.oscillator import Oscillators
 from tetra_drake.robot.gait import Gait, SteeringSignal
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
+from tetra_drake.robot.structure import AddBodies, AddNodes, node_positions
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.attachment import Attach
-from tetra_drake.systems.cable_network import AddCables, Cable
+from tetra_drake.systems.cable_network import AddNetwork, CableNetwork
 from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import AddGroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
@@ -139,7 +138,10 @@ def MakeTensegrityDiagram(
         raise InputError(scenario.name, "policy", problem)
     builder = DiagramBuilder()
 
-    plant, scene = _AddPlant(builder, scene_graph=scene_graph or meshcat is not None)
+    if scene_graph or meshcat is not None:
+        plant, scene = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    else:
+        plant, scene = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0)), None
     nodes = AddNodes(plant, structure, AddBodies(plant, structure))
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
@@ -149,21 +151,19 @@ def MakeTensegrityDiagram(
 
     if controller is None:
         signals = _AddSignals(builder, robot, gait, steering)
-    cables = AddCables(
-        builder,
-        plant,
-        cables=cables_of(structure, nodes),
-        actuated={
-            oscillator: [structure.cable_names[cable] for cable in group]
-            for oscillator, group in zip(structure.oscillators, structure.groups, strict=True)
-        },
-        actuation=scenario.actuation,
-        drives=robot.starting_drives(),
-        slack=structure.slack,
-        scene_graph=scene,
+    cables = CableNetwork(
+        robot.model,
+        names=structure.cable_names,
+        signals=structure.signals,
         parameters=parameters,
-        warns=False,
     )
+    AddNetwork(builder, plant, cables, drives=robot.starting_drives())
+    if scene is not None and cables.pieces:
+        from tetra_drake.systems.cable_geometry import AddCableGeometry
+
+        ends = node_positions(structure, structure.initial_state)[robot.model.cables.pieces]
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        AddCableGeometry(builder, scene, cables, lengths)
     if ground is None:
         ground = AddGroundContact(
             builder,
@@ -226,16 +226,6 @@ def SetStart(diagram: Diagram, context: Context, robot: Robot) -> Context:
     return context
 
 
-def _AddPlant(
-    builder: DiagramBuilder, *, scene_graph: bool
-) -> tuple[MultibodyPlant, SceneGraph | None]:
-    """Adds an empty, continuous `plant`. With `scene_graph`, also adds a SceneGraph; otherwise None
-    is returned in its place."""
-    if not scene_graph:
-        return builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0)), None
-    return AddMultibodyPlantSceneGraph(builder, time_step=0.0)
-
-
 def _ShowInMeshcat(
     builder: DiagramBuilder, plant: MultibodyPlant, scene: SceneGraph, meshcat: Meshcat
 ) -> None:
@@ -253,23 +243,6 @@ def _ShowInMeshcat(
     ApplyVisualizationConfig(
         config, builder, lcm_buses=buses, plant=plant, scene_graph=scene, meshcat=meshcat
     )
-
-
-def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
-    """The cables of a structure, for AddCables(). `nodes` are the frames at the structure's nodes,
-    in the order of the nodes, from AddNodes()."""
-    return [
-        Cable(
-            name,
-            nodes[first],
-            nodes[last],
-            law,
-            rings=tuple(nodes[node] for node in structure.cable_rings.get(cable, ())),
-        )
-        for cable, (name, law, (first, last)) in enumerate(
-            zip(structure.cable_names, structure.cable_laws, structure.cable_ends, strict=True)
-        )
-    ]
 
 
 def _AddGround(

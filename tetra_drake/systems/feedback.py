@@ -6,12 +6,12 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context
 
-from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.feedback import compute_feedback
 from tetra_drake.laws.forces import Forces
 from tetra_drake.robot.robot import Robot
+from tetra_drake.systems.attachment import bound
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
@@ -42,8 +42,8 @@ class Feedback(ConvertibleSystem):
         """
         super().__init__()
         forces, signals = Forces.of(robot.model), robot.structure.signals
-        self._parts = Packed((robot.model, forces, robot.senses))
-        self._gains, self._no_drives = np.array(gains, dtype=float), np.zeros(0)
+        self._no_drives = np.zeros(0)
+        parts = Packed((robot.model, forces, robot.senses, np.array(gains, dtype=float)))
         sizes = {"state": 13 * len(robot.structure.bodies), "signals": signals}
         sizes["mode_table"] = len(robot.structure.contacts) * MODE_COLUMNS
         if drives := len(forces.drives):
@@ -52,13 +52,11 @@ class Feedback(ConvertibleSystem):
         tickets = {port.ticket() for port in self._ports.values()}
         self.DeclareVectorOutputPort("feedback", 2 * signals, self._calc_feedback, tickets)
         state, modes = np.empty(sizes["state"]), np.empty((0, MODE_COLUMNS))
-        given = self._gains, state, modes, self._gains, self._no_drives, np.empty(2 * signals)
-        self._compute = machine_code(compute_feedback, self._parts, *given)
+        given = state, modes, np.empty(signals), self._no_drives, np.empty(2 * signals)
+        self._compute = bound(compute_feedback, parts, *given)
 
     def _calc_feedback(self, context: Context, output: BasicVector) -> None:
         given = {name: port.Eval(context) for name, port in self._ports.items()}
         modes = given["mode_table"].reshape(-1, MODE_COLUMNS)
         drives, feedback = given.get("drives", self._no_drives), output.get_mutable_value()
-        self._compute(
-            self._parts, self._gains, given["state"], modes, given["signals"], drives, feedback
-        )
+        self._compute(given["state"], modes, given["signals"], drives, feedback)

@@ -20,10 +20,9 @@ from pydrake.systems.framework import (
 )
 
 from tetra_drake.errors import InputError, check_type, checked_numbers
-from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import contact
-from tetra_drake.laws.forces import Forces, Parts, compute_ground_forces
+from tetra_drake.laws.forces import Forces, compute_ground_forces
 from tetra_drake.laws.kinematics import FORCE
 from tetra_drake.laws.mode_change import modes_after_step, next_mode_change
 from tetra_drake.laws.model import Model
@@ -31,6 +30,7 @@ from tetra_drake.systems.attachment import (
     Attach,
     DeclareOutput,
     Nodes,
+    bound,
     check_constants,
     check_frame,
     check_host,
@@ -96,15 +96,11 @@ class GroundContact(ConvertibleSystem):
         bodies, count = model.bodies.mass.size, model.ground.contacts.size
         # The kernels write to these arrays at every call.
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
-        self._parts = Packed((model, self._forces))
+        parts = Packed((model, self._forces))
         state, table = np.empty(13 * bodies), np.empty((count, contact.MODE_COLUMNS))
-        self._compute_forces = machine_code(
-            compute_ground_forces, self._parts, state, table, self._force
-        )
-        self._update_modes = machine_code(modes_after_step, self._parts, state, table)
-        self._next_change = machine_code(
-            next_mode_change, self._parts, state, self._force, table, 0.0
-        )
+        self._compute_forces = bound(compute_ground_forces, parts, state, table, self._force)
+        self._update_modes = bound(modes_after_step, parts, state, table)
+        self._next_change = bound(next_mode_change, parts, state, self._force, table, 0.0)
         self._state = self.DeclareVectorInputPort("state", state.size)
         if modes is None:
             self.DeclareDiscreteState(table.size)
@@ -146,14 +142,9 @@ class GroundContact(ConvertibleSystem):
         theirs, ours = ((*one.grid[:-1], *one.heights[:own]) for one in (ground, self._ground))
         if theirs != ours:
             raise InputError("SetGround", "ground", "found another terrain")
-        rows = [
-            numbers_for_each("SetGround", "ground", given, count=own.size, least=0.0)
-            for given, own in (
-                (ground.normal, self._ground.normal),
-                (ground.friction.constants, self._ground.friction.constants),
-            )
-        ]
-        context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(rows))
+        given, count = np.append(ground.normal, ground.friction.constants), self._constants.size
+        numbers = numbers_for_each("SetGround", "ground", given, count=count, least=0.0)
+        context.get_mutable_numeric_parameter(0).SetFromVector(numbers)
 
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
@@ -166,8 +157,11 @@ class GroundContact(ConvertibleSystem):
         `acceleration` (6*n,) is dv/dt of the bodies, with v as in the port `state`. The prediction
         assumes that the acceleration of each node is constant.
         """
-        state, modes = self._state.Eval(context), self._modes(context).copy()
-        return self._next_change(self._parts_in(context), state, acceleration, modes, horizon)
+        modes = self._modes(context).copy()
+        change: tuple[bool, float] = self._next_change(
+            self._state_in(context), acceleration, modes, horizon
+        )
+        return change
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """Witness functions of the system: one with `witness`, otherwise none."""
@@ -175,14 +169,13 @@ class GroundContact(ConvertibleSystem):
 
     def _is_due(self, context: Context) -> bool:
         """True if a mode changes at once when a step ends now."""
-        modes = self._modes(context).copy()
-        return self._update_modes(self._parts_in(context), self._state.Eval(context), modes)
+        return bool(self._update_modes(self._state_in(context), self._modes(context).copy()))
 
-    def _parts_in(self, context: Context) -> Parts:
-        """Model and tables for the kernels, with the constants in a context."""
+    def _state_in(self, context: Context) -> np.ndarray:
+        """The state in a context. The kernels get the constants in this context."""
         if self._has_parameters:
             self._constants[:] = context.get_numeric_parameter(0).value()
-        return self._parts
+        return self._state.Eval(context)
 
     def _modes(self, context: Context) -> np.ndarray:
         if self._fixed_modes is not None:
@@ -198,17 +191,15 @@ class GroundContact(ConvertibleSystem):
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         modes = values.get_mutable_value().reshape(-1, contact.MODE_COLUMNS)
         before = modes.tobytes()
-        self._update_modes(self._parts_in(context), self._state.Eval(context), modes)
+        self._update_modes(self._state_in(context), modes)
         if modes.tobytes() != before:
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # Drake keeps the values cached at this state
 
-    def _table(self, context: Context, force: np.ndarray | None = None) -> np.ndarray:
-        """The forces of the port `ground_forces` as a table (contacts, 3) in N. Writes the
-        generalized force to `force` (6*n,), if given."""
-        state, modes = self._state.Eval(context), self._modes(context)
-        written = self._force if force is None else force
-        self._compute_forces(self._parts_in(context), state, modes, written)
+    def _table(self, context: Context) -> np.ndarray:
+        """The forces of the port `ground_forces` as a table (contacts, 3) in N. Also computes the
+        generalized force."""
+        self._compute_forces(self._state_in(context), self._modes(context), self._force)
         return self._forces.ground_forces
 
     def _forces_in_world(self, context: Context) -> np.ndarray:
@@ -217,7 +208,8 @@ class GroundContact(ConvertibleSystem):
         return self._forces.nodes[self._ground.contacts, FORCE : FORCE + 3]
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._table(context, output.get_mutable_value())
+        self._table(context)
+        output.SetFromVector(self._force)
 
 
 def AddGroundContact(

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, ContinuousState
 
-from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.oscillator import Oscillators, make_states, state_rates, state_signals
+from tetra_drake.systems.attachment import bound
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
@@ -40,12 +40,10 @@ class OscillatorCpg(ConvertibleSystem):
         state, self._default_tonic = oscillators.start, np.array(tonic, dtype=float)
         self._gain, inputs = float(gain), self._default_tonic.size
         # The kernel writes to these arrays at every call.
-        self._parts, self._rates = Packed((oscillators, make_states(oscillators))), state.copy()
-        self._compute_rates = machine_code(
-            state_rates, self._parts, state, self._default_tonic, self._rates
-        )
-        self._compute_signals = machine_code(
-            state_signals, self._parts, state, self._gain, np.empty(inputs // 2)
+        parts, self._rates = Packed((oscillators, make_states(oscillators))), state.copy()
+        self._compute_rates = bound(state_rates, parts, state, self._default_tonic, self._rates)
+        self._compute_signals = bound(
+            state_signals, parts, state, self._gain, np.empty(inputs // 2)
         )
         self._tonic = self.DeclareVectorInputPort("tonic", inputs)
         self._feedback = self.DeclareVectorInputPort("feedback", inputs)
@@ -60,9 +58,9 @@ class OscillatorCpg(ConvertibleSystem):
             inputs = self._tonic.Eval(context)
         if self._feedback.HasValue(context):
             inputs = inputs + self._feedback.Eval(context)
-        self._compute_rates(self._parts, state, inputs, self._rates)
+        self._compute_rates(state, inputs, self._rates)
         derivatives.SetFromVector(self._rates)
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:
         state = context.get_continuous_state_vector().value()
-        self._compute_signals(self._parts, state, self._gain, output.get_mutable_value())
+        self._compute_signals(state, self._gain, output.get_mutable_value())

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces, compute_state_forces, compute_strut_forces
 from tetra_drake.robot.robot import Robot
+from tetra_drake.systems.attachment import bound
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
@@ -29,10 +29,10 @@ class StateForces(ConvertibleSystem):
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         bodies = len(robot.structure.bodies)
-        self._parts = Packed((robot.model, Forces.of(robot.model)))
+        parts = Packed((robot.model, Forces.of(robot.model)))
         state, self._force = np.empty(13 * bodies), np.empty(6 * bodies)
-        self._compute = machine_code(compute_state_forces, self._parts, state, self._force)
-        self._touch = machine_code(compute_strut_forces, self._parts, state, 0.0, self._force)
+        self._compute = bound(compute_state_forces, parts, state, self._force)
+        self._touch = bound(compute_strut_forces, parts, state, 0.0, self._force)
         self._state = self.DeclareVectorInputPort("state", state.size)
         sources = {self._state.ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
@@ -44,7 +44,7 @@ class StateForces(ConvertibleSystem):
             context: the system's own context, from which the bodies' motion is read.
             horizon: upper limit (s).
         """
-        return self._touch(self._parts, self._state.Eval(context), horizon, self._force)
+        return float(self._touch(self._state.Eval(context), horizon, self._force))
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._compute(self._parts, self._state.Eval(context), output.get_mutable_value())
+        self._compute(self._state.Eval(context), output.get_mutable_value())

@@ -435,7 +435,6 @@ class LaneThread:
             Memory(states, constant_numbers),
             places._replace(queue=self._queue, waiting=self._waiting),
             readings,
-            first.driven.is_live,
         )
         self._parts = Packed(parts)
         self._advance = machine_code(advance, self._parts, 0)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import functools
 import itertools
-from typing import NamedTuple, Self, TypeAlias
+from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
+from tetra_drake.engines.lanes.touching import Touching
 from tetra_drake.kernels.compiling import compiled, inlined, merged
 from tetra_drake.kernels.lanes import Real, Table, any_lane, named, select
 from tetra_drake.laws import contact, inertia
@@ -33,6 +34,35 @@ add_cables()), the damping times the time, and the number of columns."""
 
 
 BodyPairs: TypeAlias = tuple[tuple[int, int], ...]
+
+
+class StepMemory(NamedTuple):
+    """Memory of a step from `state` to `end`, the states [q; v] (13*bodies,) of the bodies. For its
+    stages see ros2."""
+
+    state: Annotated[Table, "13 * bodies"]
+    end: Annotated[Table, "13 * bodies"]
+    force: Annotated[Table, "6 * bodies"]
+    """Force at the beginning of the step."""
+    end_force: Annotated[Table, "6 * bodies"]
+    end_signals: Annotated[Table, "signals"]
+    """Signals (N) at the end of the step."""
+    change: Annotated[Table, "6 * bodies"]
+    """Change of the force, γ h df/dt."""
+    k1: Annotated[Table, "6 * bodies"]
+    k2: Annotated[Table, "6 * bodies"]
+    velocity: Annotated[Table, "6 * bodies"]
+    """Velocity v at the beginning of the step."""
+    q1: Annotated[Table, "6 * bodies"]
+    mean_rate: Annotated[Table, "6 * bodies"]
+    """Mean rate of the positions, 3/2 q1 + 1/2 q2."""
+    blocks: Annotated[Table, "blocks", BLOCK, BLOCK]
+    """Implicit matrix; see sparse."""
+    touching: Touching
+    """Contacts of struts in the implicit matrix."""
+    lines: Annotated[Table, CABLES_AT_ONCE, LINE_COLUMNS]
+    inertia: Annotated[Table, "bodies", inertia.INERTIA_COLUMNS]
+    """Inertia at the beginning of the step."""
 
 
 class Solver(NamedTuple):
@@ -146,24 +176,17 @@ def momentum(robot: Model, inertia_W: Table, velocity: Table, body: int) -> tupl
 
 @merged
 def implicit_matrix(
-    robot: Model,
-    solver: Solver,
-    state: Table,
-    modes: Table,
-    forces: Forces,
-    time: Real,
-    lines: Table,
-    blocks: Table,
+    robot: Model, solver: Solver, work: StepMemory, modes: Table, forces: Forces, time: Real
 ) -> None:
     """Writes the implicit matrix of a step, which multiplies the unknown velocity rates, to
-    `blocks`: mass matrix + time * damping matrix + time² * stiffness of contacts and anchors.
+    `work.blocks`: mass matrix + time * damping matrix + time² * stiffness of contacts and anchors.
 
-    `blocks` (blocks, 6, 6) has a block per body and per pair of coupled bodies; see module sparse.
-    Of a symmetric block only the upper half is written. `state` and `modes` are at the beginning of
-    the step, and `forces` was computed for them. `time` is in s, a share of the step. The damping
-    of cables, normal forces and stiction makes the equations stiff. `lines` (CABLES_AT_ONCE,
-    LINE_COLUMNS) is scratch memory.
+    There is a block per body and per pair of coupled bodies; see module sparse. Of a symmetric
+    block only the upper half is written. `work.state` and `modes` are at the beginning of the step,
+    and `forces` was computed for them. `time` is in s, a share of the step. The damping of cables,
+    normal forces and stiction makes the equations stiff.
     """
+    blocks = work.blocks
     for body in range(robot.bodies.mass.size):
         for r in range(BLOCK):
             for c in range(r, BLOCK):
@@ -176,7 +199,7 @@ def implicit_matrix(
     for pair in range(solver.coupled.size):
         first, last = couplings.first_cable[pair], couplings.first_cable[pair + 1]
         for cable in range(first, last, CABLES_AT_ONCE):
-            add_cables(robot, solver, forces, time, pair, cable, lines, blocks)
+            add_cables(robot, work, forces, time, pair, cable, solver.coupled[pair])
     for i in range(couplings.held.size):  # cables from fixed nodes
         node, body = robot.cables.node_b[i], couplings.held[i]
         damping = time * forces.cable_forces[i, TENSION_PER_RATE]
@@ -201,7 +224,7 @@ def implicit_matrix(
             blocks[body, r, r] += mass
     for i in range(robot.ground.contacts.size):
         if any_lane(modes[i, contact.CONTACT] != 0.0):
-            add_contact(state, modes, forces, robot.ground, i, time, blocks)
+            add_contact(robot, work.state, modes, forces, i, time, blocks)
     anchors = robot.anchors
     for i in range(anchors.nodes.size):
         k_x, k_y, k_z = vector_at(anchors.stiffness, i, 0)
@@ -209,32 +232,25 @@ def implicit_matrix(
         k = time * (c_x + time * k_x), time * (c_y + time * k_y), time * (c_z + time * k_z)
         add_diagonal(forces.nodes, anchors.nodes[i], anchors.carriers[i], k, blocks)
     if robot.joints.node_a.size or robot.cables.routes.nodes.size:
-        add_joints_and_routes(robot, solver, state, forces, time, blocks)
+        add_joints_and_routes(robot, solver, work.state, forces, time, blocks)
 
 
 @inlined
 def add_cables(
-    robot: Model,
-    solver: Solver,
-    forces: Forces,
-    time: Real,
-    pair: int,
-    first: int,
-    lines: Table,
-    blocks: Table,
+    robot: Model, work: StepMemory, forces: Forces, time: Real, pair: int, first: int, block: int
 ) -> None:
-    """Adds the damping of a pair's cables to the implicit matrix `blocks`, as time * damping * l
-    lᵀ.
+    """Adds the damping of a pair's cables to the implicit matrix, as time * damping * l lᵀ.
 
-    `pair` is the number of a pair of bodies that cables join. At most CABLES_AT_ONCE (6) of its
-    cables are added, from cable number `first` of the robot on. `time` is in s; `lines` is scratch
-    memory, a row per cable. The cables' directions and dampings are read from `forces`.
+    `pair` is the number of a pair of bodies that cables join, `block` the number of their block. At
+    most CABLES_AT_ONCE (6) of the pair's cables are added, from cable number `first` of the robot
+    on. `time` is in s. The cables' directions and dampings are read from `forces`.
 
     The 12 numbers of l, times the velocities of both bodies, are the rate of the cable's length.
     With the cable's direction d and its ends p_a and p_b, relative to the origins of their bodies,
     l = (u, -d, w, d), u = d x p_a and w = p_b x d. The sum over cables is a product of two columns
     of `lines`.
     """
+    lines, blocks = work.lines, work.blocks
     last, cable_forces = robot.couplings.first_cable[pair + 1], forces.cable_forces
     for j in range(CABLES_AT_ONCE):
         i = first + j
@@ -252,7 +268,6 @@ def add_cables(
 
     rear, front = robot.couplings.first[pair], robot.couplings.second[pair]
     adds = first > robot.couplings.first_cable[pair]  # the block has a sum already
-    block = solver.coupled[pair]
     weights = column(lines, WEIGHT)
     for r in range(3):
         u = weighted(weights, column(lines, U + r))
@@ -391,13 +406,7 @@ def product(x: Column, y: Column) -> Real:
 
 @inlined
 def add_contact(
-    state: Table,
-    modes: Table,
-    forces: Forces,
-    ground: contact.Ground,
-    i: int,
-    time: Real,
-    blocks: Table,
+    robot: Model, state: Table, modes: Table, forces: Forces, i: int, time: Real, blocks: Table
 ) -> None:
     """Adds the contact of a foot to the implicit matrix `blocks`, in lanes where the foot touches.
 
@@ -405,7 +414,8 @@ def add_contact(
     ground, along its normal and its tangents, with `time` in s. `state`, `modes` and `forces` are
     only read.
     """
-    nodes, frames, law = forces.nodes, forces.frames, named(contact.NormalForce, ground.normal)
+    ground, nodes, frames = robot.ground, forces.nodes, forces.frames
+    law = named(contact.NormalForce, ground.normal)
     touches, node, body = modes[i, contact.CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
     depth = -contact.gap(nodes, ground, frames, i)
     slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)

@@ -17,8 +17,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.lanes.dynamics import Solver, accelerate
-from tetra_drake.engines.lanes.ros2 import StepMemory, larger, take_step
+from tetra_drake.engines.lanes.dynamics import Solver, StepMemory, accelerate
+from tetra_drake.engines.lanes.ros2 import larger, take_step
 from tetra_drake.kernels.compiling import inlined, merged
 from tetra_drake.kernels.lanes import (
     Real,
@@ -52,8 +52,8 @@ AIM_FACTOR = 1.02
 covers the error of the prediction, and the setting `look_ahead` is added."""
 EVALUATIONS = 3
 """Number of force evaluations per attempted step."""
-STATUS, TIME, PLANNED, STEP, END, MARK, DUE, ACTIVE, SAMPLES, TRIED, TAKEN = range(11)
-"""Rows of `clock`. Times and lengths of steps are in s.
+STATUS, TIME, PLANNED, STEP, END, MARK, DUE, ACTIVE, SAMPLES, TRIED, TAKEN, CLOCK_ROWS = range(12)
+"""Rows of `clock`, and their number. Times and lengths of steps are in s.
 
 STATUS, TIME: status of the lane and its time. PLANNED: length of the next step. STEP, END: length
 and end of the step that is tried. MARK: next time at which a step must end. DUE: time of the next
@@ -61,13 +61,9 @@ sample. ACTIVE: 1 if signals act, 0 before the start-up time. SAMPLES: number of
 the signals. TRIED, TAKEN: numbers of steps.
 """
 
-CLOCK_ROWS = 11
-
-ACCEPTED, NETWORK_STEPS, TURN_INDEX = range(3)
-"""Rows of `scratch`: 1 if the step is accepted, 1 if the network takes a step, and the position in
-the steering table `turns` (an index with a fraction)."""
-
-SCRATCH_ROWS = 3
+ACCEPTED, NETWORK_STEPS, TURN_INDEX, SCRATCH_ROWS = range(4)
+"""Rows of `scratch`, and their number: 1 if the step is accepted, 1 if the network takes a step,
+position in the steering table `turns` (an index with a fraction)."""
 
 
 class Constants(NamedTuple):
@@ -97,6 +93,9 @@ class Constants(NamedTuple):
     max_evaluations: Table
     max_speed: Table
     """Speed limit of the bodies."""
+    is_live: bool
+    """True if the network is integrated together with the robots; otherwise signals are
+    interpolated between samples."""
 
 
 class LaneState(NamedTuple):
@@ -122,8 +121,6 @@ class LaneState(NamedTuple):
     """Numbers that are computed for all lanes and then read lane by lane."""
     forces: Forces
     acceleration: Annotated[Table, "6 * bodies"]
-    end_signals: Annotated[Table, "signals"]
-    """Signals at the end of the lane's step."""
     end_drives: Annotated[Table, "drives"]
     """States of the actuators at the end of the lane's step."""
     output: Annotated[Table, "signals"]
@@ -164,19 +161,18 @@ class Log(NamedTuple):
 
 
 @merged
-def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
+def iterate(constants: Constants, lanes: LaneState, log: Log) -> bool:
     """Tries one step in each lane, with a length of its own. A lane whose error is too large stays
     where it is, and plans a shorter step. Changes the tables of `lanes` and `log` in place.
 
-    `live` is True if the network is integrated together with the robot; otherwise signals are
-    interpolated between samples. Returns True if a simulation has ended: at the time up to which it
-    was to run, or by a failure. Samples of motions that are recorded go to `log`.
+    Returns True if a simulation has ended: at the time up to which it was to run, or by a failure.
+    Samples of motions that are recorded go to `log`.
     """
     clock, ended = lanes.clock, False
     if any_lane((clock[STATUS] == RUNNING) & (clock[TIME] >= clock[MARK])):
-        if not live:
+        if not constants.is_live:
             run_ahead(constants, lanes, log, clock[TIME])
-        ended = pass_marks(constants, lanes, log, live)
+        ended = pass_marks(constants, lanes, log)
     is_running = clock[STATUS] == RUNNING
 
     # Modes and forces at the beginning of the step.
@@ -185,32 +181,31 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     for i in range(lanes.drives.shape[0]):
         forces.drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE]
     contact.update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
-    compute_forces(robot, state, lanes.modes, lanes.signals, True, forces, lanes.step.force)
+    compute_forces(robot, state, lanes.modes, lanes.signals, forces, lanes.step.force)
     observe(lanes.tally, robot, clock[TIME], lanes.signals, forces)
 
     step = select(is_running, aim(constants, lanes), 0.0)
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
-    foresee_signals(constants, lanes, log, live)
+    foresee_signals(constants, lanes, log)
     drives, at_end = lanes.drives, forces.drives
     for i in range(drives.shape[0]):  # predicted, for the forces at the end of the step
         drives[i, actuator.RATE] = at_end[i, actuator.RATE]
         at_end[i, actuator.DRIVE] = drives[i, actuator.DRIVE] + step * drives[i, actuator.RATE]
-    solver, signals = constants.solver, lanes.end_signals
-    error = take_step(robot, solver, lanes.step, lanes.modes, forces, signals, step, live)
+    error = take_step(robot, constants.solver, lanes.step, lanes.modes, forces, step)
     for i in range(drives.shape[0]):  # corrected, with the mean of the rates at both ends
         rate = 0.5 * (drives[i, actuator.RATE] + at_end[i, actuator.RATE])
         lanes.end_drives[i] = drives[i, actuator.DRIVE] + step * rate
 
     accepted = is_running & (error <= constants.tolerance[0])
-    if live:
+    if constants.is_live:
         feel(constants, lanes, log, step_end, lanes.step.end)
         network, states = constants.oscillators, lanes.oscillators
         oscillator.correct_states(network, lanes.inputs, step, accepted, states)
-        drive(constants, lanes)
+        drive(constants, lanes, lanes.step.end_signals)
     if any_lane(accepted & (clock[DUE] <= step_end)):
         lanes.scratch[ACCEPTED] = select(accepted, 1.0, 0.0)
-        keep_samples(constants, lanes, log, live)
+        keep_samples(constants, lanes, log)
     move_on(lanes, is_running, accepted)
 
     factor = SAFETY * math.sqrt(constants.tolerance[0] / maximum(error, 1e-12))
@@ -225,21 +220,20 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
 
 
 @inlined
-def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
-    """Writes the signals (N) at the end of the step to `lanes.end_signals`. `live` is True if the
-    network is integrated together with the robot; then the signals are a prediction, corrected at
-    the end of the step. Otherwise they are interpolated between samples."""
+def foresee_signals(constants: Constants, lanes: LaneState, log: Log) -> None:
+    """Writes the signals (N) at the end of the step to `lanes.step.end_signals`. The signals of a
+    live network are a prediction, corrected at the end of the step."""
     clock = lanes.clock
-    if live:
+    if constants.is_live:
         feel(constants, lanes, log, clock[TIME], lanes.step.state)
         states = lanes.oscillators
         oscillator.euler_step(constants.oscillators, lanes.inputs, clock[STEP], states)
-        drive(constants, lanes)
+        drive(constants, lanes, lanes.step.end_signals)
         return
     run_ahead(constants, lanes, log, clock[END])
     for lane in range(log.place.size):
         end = by_lane(clock)[END, lane]
-        interpolate(constants, lanes, log, lane, end, by_lane(lanes.end_signals))
+        interpolate(constants, lanes, log, lane, end, by_lane(lanes.step.end_signals))
 
 
 @inlined
@@ -251,7 +245,7 @@ def move_on(lanes: LaneState, is_running: Truth, accepted: Truth) -> None:
     for i in range(state.size):
         state[i] = select(accepted, lanes.step.end[i], state[i])
     for k in range(lanes.signals.size):
-        lanes.signals[k] = select(accepted, lanes.end_signals[k], lanes.signals[k])
+        lanes.signals[k] = select(accepted, lanes.step.end_signals[k], lanes.signals[k])
     for i in range(lanes.drives.shape[0]):
         now = lanes.drives[i, actuator.DRIVE]
         lanes.drives[i, actuator.DRIVE] = select(accepted, lanes.end_drives[i], now)
@@ -362,14 +356,13 @@ def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> Non
 
 
 @inlined
-def drive(constants: Constants, lanes: LaneState) -> None:
-    """Writes the signals (N) of a live network at the end of the step to `lanes.end_signals`: the
-    gain times the oscillators' outputs, but 0 before the start-up time. `lanes.oscillators` must be
-    at the end of the step already."""
+def drive(constants: Constants, lanes: LaneState, signals: Table) -> None:
+    """Writes the signals (N) of a live network to `signals` (m,), at the time of the table
+    `lanes.oscillators`: the gain times the oscillators' outputs, but 0 before the start-up time."""
     oscillator.outputs_of(constants.oscillators, lanes.oscillators, lanes.output)
     active, gain = lanes.clock[ACTIVE] != 0.0, constants.gain[0]
     for k in range(lanes.output.size):
-        lanes.end_signals[k] = select(active, gain * lanes.output[k], 0.0)
+        signals[k] = select(active, gain * lanes.output[k], 0.0)
 
 
 @inlined
@@ -405,16 +398,13 @@ def row_of(sample: int, log: Log) -> int:
 
 
 @merged
-def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
+def pass_marks(constants: Constants, lanes: LaneState, log: Log) -> bool:
     """Sets the next mark and the present signals in `lanes`, for lanes that have reached their
     mark. A mark is a time at which a step must end.
 
-    A lane that has reached its pause gets the status DONE. Returns True if there is one. `live` is
-    True if the network is integrated together with the robot.
+    A lane that has reached its pause gets the status DONE. Returns True if there is one.
     """
     clock, signals, done = by_lane(lanes.clock), by_lane(lanes.signals), False
-    if live:
-        oscillator.outputs_of(constants.oscillators, lanes.oscillators, lanes.output)
     for lane in range(log.place.size):
         if clock[STATUS, lane] != RUNNING or clock[TIME, lane] < clock[MARK, lane]:
             continue
@@ -427,12 +417,10 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
             done = True
         start_up = by_lane(constants.start_up)[0, lane]
         clock[ACTIVE, lane] = 1.0 if clock[TIME, lane] >= start_up else 0.0
-        if not live:
+        if not constants.is_live:
             interpolate(constants, lanes, log, lane, clock[TIME, lane], signals)
-            continue
-        for k in range(lanes.output.size):
-            force = by_lane(constants.gain)[0, lane] * by_lane(lanes.output)[k, lane]
-            signals[k, lane] = clock[ACTIVE, lane] * force
+    if constants.is_live:
+        drive(constants, lanes, lanes.signals)
     return done
 
 
@@ -448,12 +436,13 @@ def next_mark(log: Log, place: int, time: float) -> float:
 
 
 @merged
-def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
+def keep_samples(constants: Constants, lanes: LaneState, log: Log) -> None:
     """Writes the samples of the motion that are due within the step to the tables of `log`, for
     lanes that accept the step. Contact modes are the ones during the step; all else is
-    interpolated. `live` is True if the network is integrated together with the robot."""
+    interpolated."""
     clock, modes, accepted = by_lane(lanes.clock), by_lane(lanes.modes), by_lane(lanes.scratch)
     signals = np.empty((lanes.signals.size, log.place.size))
+    starts, ends = by_lane(lanes.signals), by_lane(lanes.step.end_signals)
     for lane in range(log.place.size):
         place = log.place[lane]
         while accepted[ACCEPTED, lane] != 0.0 and clock[DUE, lane] <= clock[END, lane]:
@@ -467,12 +456,12 @@ def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -
             for k in range(modes.shape[0]):
                 for c in range(contact.MODE_COLUMNS):
                     log.modes[place, i, k, c] = modes[k, c, lane]
-            if not live:
+            if not constants.is_live:
                 interpolate(constants, lanes, log, lane, due, signals)
             for k in range(signals.shape[0]):
-                first, last = by_lane(lanes.signals)[k, lane], by_lane(lanes.end_signals)[k, lane]
+                first, last = starts[k, lane], ends[k, lane]
                 between = first + part * (last - first)
-                log.signals[place, i, k] = between if live else signals[k, lane]
+                log.signals[place, i, k] = between if constants.is_live else signals[k, lane]
             drives, end_drives = by_lane(lanes.drives), by_lane(lanes.end_drives)
             for k in range(lanes.drives.shape[0]):
                 first, last = drives[k, actuator.DRIVE, lane], end_drives[k, lane]

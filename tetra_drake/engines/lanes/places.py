@@ -54,9 +54,8 @@ class Memory(NamedTuple):
     constants: Table
 
 
-LaneParts: TypeAlias = Packed[tuple[Constants, LaneState, Log, Memory, Places, Readings, bool]]
-"""The simulations, packed for kernels that Python calls often. The last part is True if the network
-is live."""
+LaneParts: TypeAlias = Packed[tuple[Constants, LaneState, Log, Memory, Places, Readings]]
+"""The simulations, packed for kernels that Python calls often."""
 
 
 @functools.partial(compiled, nogil=True)
@@ -68,13 +67,13 @@ def advance(parts: LaneParts, rounds: int) -> None:
     robot has ended at its pause, or if it has failed. The robots that wait at first begin together
     with a round, so that their clearances are due together.
     """
-    constants, lanes, log, _, places, readings, live = unpacked(parts)
+    constants, lanes, log, _, places, readings = unpacked(parts)
     clock, robot, state = lanes.clock, constants.robot, lanes.step.state
     exchange(parts)
     for _ in range(rounds):
         ended = False
         for _ in range(ROUND):
-            has_ended = loop.iterate(constants, lanes, log, live)
+            has_ended = loop.iterate(constants, lanes, log)
             if has_ended:
                 read_paused(lanes, log, readings)
 
@@ -101,7 +100,7 @@ def advance(parts: LaneParts, rounds: int) -> None:
 def exchange(parts: LaneParts) -> None:
     """Copies the states of robots that have ended from their lanes back to their rows of the tables
     of Places, and puts waiting robots from the tables into idle lanes."""
-    constants, lanes, log, memory, places, _, _ = unpacked(parts)
+    constants, lanes, log, memory, places, _ = unpacked(parts)
     clock, held, queue = by_lane(lanes.clock), by_lane(lanes.signals), places.queue
     searched = by_lane(lanes.forces.near_struts.p_WN)
     for lane in range(log.place.size):

@@ -87,8 +87,9 @@ class Prepared:
             look_ahead=np.array([look_ahead(tolerance)]),
             max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
             max_speed=np.array([speed_limit(driven)]),
+            is_live=driven.is_live,
         )
-        kind = driven.is_live, shared(constants)
+        kind = shared(constants)
         start = allocate(LaneState, sizes)
         start.clock[loop.STATUS], start.clock[loop.DUE] = loop.DONE, times[1]
         start.clock[loop.PLANNED] = min(look_ahead(tolerance), longest)

@@ -34,11 +34,9 @@ mass matrix at the beginning.
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
 
-from tetra_drake.engines.lanes import dynamics
+from tetra_drake.engines.lanes.dynamics import Solver, StepMemory, implicit_matrix, momentum
 from tetra_drake.engines.lanes.touching import (
-    Touching,
     add_touching,
     solve_touching,
     subtract_springs,
@@ -55,49 +53,15 @@ from tetra_drake.laws.vectors import Vector3, cross, vector_at
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
-class StepMemory(NamedTuple):
-    """Memory of a step from `state` to `end`, the states [q; v] (13*bodies,) of the bodies."""
-
-    state: Annotated[Table, "13 * bodies"]
-    end: Annotated[Table, "13 * bodies"]
-    force: Annotated[Table, "6 * bodies"]
-    """Force at the beginning of the step."""
-    end_force: Annotated[Table, "6 * bodies"]
-    change: Annotated[Table, "6 * bodies"]
-    """Change of the force, γ h df/dt."""
-    k1: Annotated[Table, "6 * bodies"]
-    k2: Annotated[Table, "6 * bodies"]
-    velocity: Annotated[Table, "6 * bodies"]
-    """Velocity v at the beginning of the step."""
-    q1: Annotated[Table, "6 * bodies"]
-    mean_rate: Annotated[Table, "6 * bodies"]
-    """Mean rate of the positions, 3/2 q1 + 1/2 q2."""
-    blocks: Annotated[Table, "blocks", BLOCK, BLOCK]
-    """Implicit matrix; see sparse."""
-    touching: Touching
-    """Contacts of struts in the implicit matrix."""
-    lines: Annotated[Table, dynamics.CABLES_AT_ONCE, dynamics.LINE_COLUMNS]
-    inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
-    """Inertia at the beginning of the step."""
-
-
 @merged
 def take_step(
-    robot: Model,
-    solver: dynamics.Solver,
-    work: StepMemory,
-    modes: Table,
-    forces: Forces,
-    signals: Table,
-    step: Real,
-    write_parts: bool,
+    robot: Model, solver: Solver, work: StepMemory, modes: Table, forces: Forces, step: Real
 ) -> Real:
     """Writes the end of a step of length `step` (s) to `work.end`. Returns an estimate of its
     error.
 
-    Input: `work.state`; `work.force` and `forces`, both computed for this state; and `signals` (m,)
-    in N at the end of the step. `forces` is overwritten; with `write_parts` it holds the forces of
-    cables and ground in stage 2 of ROS2.
+    Input: `work.state`; `work.force` and `forces`, both computed for this state; and
+    `work.end_signals`. `forces` is overwritten by the forces in stage 2 of ROS2.
 
     The error is the difference to the embedded first-order solution: the largest difference of a
     velocity (m/s) of a body or, for rotations, of its nodes. NaN if a velocity is NaN.
@@ -107,7 +71,7 @@ def take_step(
     size, scaled = work.force.size, GAMMA * step
     bodies = size // BLOCK
     first = state.size - size
-    dynamics.implicit_matrix(robot, solver, state, modes, forces, scaled, work.lines, work.blocks)
+    implicit_matrix(robot, solver, work, modes, forces, scaled)
     factorise(work.blocks, solver.schedule)
     add_touching(robot, solver.schedule, forces, scaled, work.blocks, work.touching)
     if not robot.isotropic:
@@ -118,7 +82,7 @@ def take_step(
     for i in range(size):
         velocity[i] = end[first + i] = state[first + i]
     move_bodies(state, velocity, step, end)
-    compute_end_forces(robot, work, modes, forces, signals, False)
+    compute_end_forces(robot, work, modes, forces)
     for i in range(size):
         work.change[i] = GAMMA * (work.end_force[i] - work.force[i])
         k1[i] = work.force[i] + work.change[i]
@@ -128,9 +92,9 @@ def take_step(
         q1[i] = velocity[i] + scaled * k1[i]
         end[first + i] = velocity[i] + step * k1[i]
     move_bodies(state, q1, step, end)
-    compute_end_forces(robot, work, modes, forces, signals, write_parts)
+    compute_end_forces(robot, work, modes, forces)
     for body in range(bodies):
-        gained = dynamics.momentum(robot, work.inertia, k1, body)
+        gained = momentum(robot, work.inertia, k1, body)
         for j in range(BLOCK):
             i = BLOCK * body + j
             k2[i] = work.end_force[i] - 2.0 * gained[j] - work.change[i]
@@ -146,18 +110,16 @@ def take_step(
 
 
 @inlined
-def compute_end_forces(
-    robot: Model, work: StepMemory, modes: Table, forces: Forces, signals: Table, write_parts: bool
-) -> None:
+def compute_end_forces(robot: Model, work: StepMemory, modes: Table, forces: Forces) -> None:
     """Writes the generalized forces (6*bodies,) at the state work.end to work.end_force.
 
     Torques are converted to the mass matrix at the beginning of the step: the angular accelerations
-    stay the same. `signals` (m,) are in N, `modes` are the contact modes during the step. `forces`
-    is working memory; with `write_parts` it then holds the forces of cables and ground.
+    stay the same. `modes` are the contact modes during the step. `forces` then holds all forces
+    there.
     """
     force = work.end_force
     move_robot(robot, work.end, forces)
-    compute_forces(robot, work.end, modes, signals, write_parts, forces, force)
+    compute_forces(robot, work.end, modes, work.end_signals, forces, force)
     if robot.isotropic:
         return
     for body in range(force.size // BLOCK):

@@ -28,10 +28,7 @@ def converted(
         InputError: names file and key.
     """
     if format_of(file) == "MuJoCo":
-        content = mjcf_tree(file, without=without)
-        if unit is not None:
-            content["unit"] = unit
-        return structure_of(content, file)
+        return structure_of(mjcf_tree(file, without=without), file)
     if without:
         problem = f"found {', '.join(without)}, expected bodies of a file of MuJoCo"
         raise InputError(file, "without", problem)
