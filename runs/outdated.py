@@ -62,9 +62,9 @@ def first_difference(run: Run) -> str:
     differ."""
     most = ON_DIAGRAM if run.scenario.engine_name == "drake" else EVALUATIONS
     trial, vectors = made(run, 0), asked(run, 0, most)
-    genomes = run.with_parameters.query("trial == 0 and index < @most")["index"].astype(int)
-    alike = [np.allclose(vectors[i], run.vector(0, i), rtol=PARAMETERS, atol=0.0) for i in genomes]
-    kept, iterations = genomes.tolist(), trial["iteration"].astype(int)
+    kept = run.with_parameters.query("trial == 0 and index < @most")["index"].tolist()
+    alike = [np.allclose(vectors[i], run.vector(0, i), rtol=PARAMETERS, atol=0.0) for i in kept]
+    iterations = trial["iteration"].astype(int)
     evaluate = GaitEvaluation(run.scenario)
     with evaluator_of(evaluate, workers=available_cores(), warn=print) as evaluator:
         tasks = [
