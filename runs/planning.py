@@ -38,7 +38,7 @@ from planning_page import (
 )
 from records import append
 from scipy.ndimage import generate_binary_structure, map_coordinates, minimum_filter
-from script import chosen, evolved, script
+from script import chosen, evolved, script, with_defaults
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.lab.planner import Planner
@@ -202,7 +202,8 @@ def all_episodes() -> list[Episode]:
     """All episodes, in the order of the file: one for each combination of the values in `each`."""
     episodes = []
     for row in GIVEN["episodes"]:
-        common, each = GIVEN["defaults"] | row, row.get("each", {})
+        common = with_defaults(row, GIVEN["defaults"], HERE / "episodes.yaml")
+        each = common["each"]
         for values in itertools.product(*each.values()):
             given = common | dict(zip(each, values, strict=True))
             episodes.append(Episode(**given | {"name": row["name"].format(**given)}))

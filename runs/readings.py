@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pandas
-from script import chosen, evolved, read_record, read_settings, script
+from script import chosen, evolved, read_record, read_settings, script, with_defaults
 
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import check_file, read_json, write_whole
@@ -33,9 +33,9 @@ SCRATCH = Path("out/readings")
 Record: TypeAlias = dict[str, list[dict[str, float]]]
 """Numbers of the trials by reading."""
 
-
-READINGS, FUTURE, THESIS = read_settings(HERE / "readings.yaml").values()
-"""Readings, and variations that the thesis proposes, by name; and the thesis's results."""
+FILE = HERE / "readings.yaml"
+DEFAULTS, READINGS, FUTURE, THESIS = read_settings(FILE).values()
+"""Readings, and variations that the thesis proposes, by name. THESIS has its results."""
 ALL = READINGS | FUTURE
 COARSE, FIXED = (READINGS[f"slip-{name}"]["changes"]["engine"] for name in ("coarse", "fixed"))
 """Engines of two readings."""
@@ -43,10 +43,10 @@ COARSE, FIXED = (READINGS[f"slip-{name}"]["changes"]["engine"] for name in ("coa
 
 def run_of(name: str) -> Run:
     """The run of a reading, evolved as far as it is not yet."""
-    reading = {"base": "thesis", "changes": {}} | ALL[name]
-    if "trials_of" in reading:
+    reading = with_defaults(ALL[name], DEFAULTS, FILE)
+    if reading["trials_of"]:
         return run_of(reading["trials_of"])
-    if "run" in reading:
+    if reading["run"]:
         return load_run(HERE / reading["run"])
     base = load_scenario(reading["base"]).on_engine("compiled")
     changes = {"name": f"reading-{name}"} | reading["changes"]

@@ -108,6 +108,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     if not (made / MANIFEST).exists():
         save_times(load_times(out) | {name: {}}, out)
     with timed(name, EVOLUTION, out):
+        # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
         evolved(scenario, made)
     publish(name, experiment, made, out=out)
 

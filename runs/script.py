@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -56,6 +56,14 @@ def chosen(names: Sequence[str], known: Iterable[str], what: str = "NAME") -> li
 def read_settings(file: Path) -> Any:
     """Content of a YAML file. Raises InputError if it cannot be read."""
     return parse_yaml(read_text(file, "settings"), file)
+
+
+def with_defaults(given: Mapping[str, Any], defaults: Mapping[str, Any], file: Path) -> Any:
+    """An entry of a file of settings, with the defaults of what it leaves out. Raises InputError
+    for a key without a default."""
+    if unknown := given.keys() - defaults.keys():
+        raise InputError(file, min(unknown), f"is unknown, expected one of {listed([*defaults])}")
+    return {**defaults, **given}
 
 
 def read_record(path: Path, use: Callable[[Any], T], command: str) -> T:

@@ -5,7 +5,6 @@
 
 import contextlib
 import copy
-import dataclasses
 import functools
 import io
 import json
@@ -19,7 +18,6 @@ from collections import Counter
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-import bench
 import numpy as np
 import pytest
 import yaml
@@ -123,15 +121,6 @@ def evolved(rng, folder):
     return td.evolve(PRISM.on_engine("drake"), folder / "run", executor=executor, **given)
 
 
-def changed(rng, folder):
-    context = made()[3].CreateDefaultContext()
-    cables, ground = (made()[3].GetSubsystemByName(name) for name in ("cables", "ground"))
-    law = cables.GetLaw(own := cables.GetMyMutableContextFromRoot(context))
-    cables.SetLaw(own, either(rng, law._replace(**odd(rng, **law._asdict()))))
-    given = Robot.of(PRISM).ground._replace(**odd(rng, friction=0, normal=0))
-    ground.SetGround(ground.GetMyMutableContextFromRoot(context), given)
-
-
 def restored(rng, folder):
     states = made()[0].save()
     states.tables[rng.choice([*states.tables])] = rng.choice([np.zeros(3), np.zeros((2, 2), int)])
@@ -170,16 +159,6 @@ def plugged(rng, folder):
     Given.bounds = rng.choice([*ODD, (0.0, 1.0)])
     scenario = PRISM.with_sections(policy=Given())
     td.simulate(scenario, td.seeded_gait(scenario, 1))
-
-
-def entered(rng, folder):
-    text = f"def solve(problem, seed):\n    answer = {rng.choice(PLAIN)!r}\n"
-    text += f"    {rng.choice(GIVEN['solvers'])}\n"
-    text += rng.choice(["", "TASKS = {!r}\n", "CHANGES = {!r}\n"]).format(rng.choice(PLAIN))
-    (folder / "own.py").write_text("from math import inf, nan\n" + text)
-    entry = bench.Entry.of(folder / "own.py")
-    task = dataclasses.replace(bench.TASKS[0], changes={"simulation.duration": "2 s"})
-    bench.solved(entry, task, [0], episodes=1)
 
 
 def stepped(rng, folder):
@@ -244,13 +223,11 @@ SURFACES = {
     "MakeSimulator": lambda r, f: MakeSimulator(
         **odd(r, diagram=made()[3], robot=Robot.of(PRISM), settings=Drake())
     ),
-    "SetLaw, SetGround": changed,
     "MakeDisturbedSimulator": lambda r, f: MakeDisturbedSimulator(
         **odd(r, scenario=PRISM.with_changes(SPREAD), gait=made()[5], generator=RandomGenerator(1))
     ),
     "commands": commanded,
     "plug-ins": plugged,
-    "bench": entered,
     "Simulation": stepped,
     "gym": played,
     "springs": sprung,

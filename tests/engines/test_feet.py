@@ -123,12 +123,6 @@ def test_a_foot_is_as_thick_as_its_sphere_else_as_its_strut_unless_the_file_says
     assert radius({}, spheres={"ball": ball}) == 0.03
 
 
-def test_a_foot_below_the_ground_that_anchors_keep_there_is_refused(refused):
-    tree = WHEELS | {"nodes": {"a": [0.0, 0.0, 0.0], "b": [0.0, 0.4, 0.0]}, "anchors": {"b": "z"}}
-    with refused("anchored", "robot.nodes.a", "radius"):
-        Robot.of(scenario_of(tree, terrain="!Flat"))
-
-
 def test_the_deflection_of_a_foot_that_rolls_and_pivots_is_how_far_it_slid():
     # With a constant w_WB and a lowest point that slides at u, the error falls with the step
     # squared.

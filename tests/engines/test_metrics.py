@@ -38,12 +38,17 @@ def test_tallied_metrics_are_those_of_the_trajectory():
     in_steady = speed[walk.trajectory.time.values[1:] > 0.5].max()
     assert metrics.peak_actuator_speed == pytest.approx(in_steady, rel=0.01)
     assert in_steady < 0.9 * speed.max()
-    load = steady.tension.values[:, driven].max()
-    assert metrics.peak_actuator_force == pytest.approx(load, rel=1e-3)
+    loads = steady.tension.values[:, driven]
+    assert metrics.peak_actuator_force == pytest.approx(loads.max(), rel=1e-3)
+    assert metrics.mean_actuator_force == pytest.approx(loads.mean(), rel=1e-2)
+    mean_speed = np.abs(shortening).mean() / 1e-3
+    assert metrics.mean_actuator_speed == pytest.approx(mean_speed, rel=1e-2)
+    assert metrics.speed == pytest.approx(way[0] / 0.7, rel=1e-3)
     # A foot may touch and leave within a sample.
     off = off_ground(steady).groupby("contact_body").all("contact")
     shares = off.mean("time").sel(contact_body=steady.body.values).values
     assert metrics.lifted_shares == pytest.approx(shares, abs=5e-3)
+    assert metrics.lifted == pytest.approx(shares.mean(), abs=5e-3)
     assert metrics.tension == pytest.approx(walk.trajectory.tension.values.min(), rel=1e-3)
     distances = [strut_clearance(robot, state) for state in motion.states]
     # Looked at every 40 ms or so.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from verification import completed
+from verification import PROBLEMS
 from verification_references import formula
 
 from helpers.anchored import TREES, scenario_of, supported_prism
@@ -105,7 +105,7 @@ def folded(duration: float = 0.4) -> Robot:
 
 def as_a_double_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
     """Lagrange's equations of two bars, for their angles from the vertical."""
-    problem, (a, b) = completed("double_pendulum"), LEANS
+    problem, (a, b) = PROBLEMS["double_pendulum"], LEANS
     states = problem["states"] | {"a": [a, "a_rate"], "b": [b, "b_rate"]}
     upper, lower = formula(times, problem | {"states": states, "known": "array([a, b])"})
     knee = UPPER * along(upper)

@@ -66,13 +66,13 @@ def written_out(blocks: np.ndarray, schedule: Schedule) -> np.ndarray:
 def compute_force(parts: Parts, modes: Table, signals: Table) -> None:
     robot, _, forces, work = unpacked(parts)
     move_robot(robot, work.state, forces)
-    compute_forces(robot, work.state, modes, signals, forces, work.force)
+    compute_forces(robot, work.state, modes, signals, True, forces, work.force)
 
 
 @compiled
 def step_once(parts: Parts, modes: Table, h: Real) -> Real:
     robot, solver, forces, work = unpacked(parts)
-    return take_step(robot, solver, work, modes, forces, h)
+    return take_step(robot, solver, work, modes, forces, h, False)
 
 
 @compiled

@@ -19,7 +19,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 import tetra_drake as td
 from helpers.actuations import WINCH
-from helpers.anchored import HUNG, SWINGING, TREES, scenario_of
+from helpers.anchored import BAR, HUNG, SWINGING, TREES, scenario_of
 from helpers.bars import ACROSS, loose_bars
 from helpers.brief import BRIEF
 from helpers.controllers import OwnGround, Springs
@@ -49,6 +49,7 @@ from tetra_drake.robot.ground import make_surface
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import save_signals
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.systems import AddCables, AddGroundContact, Cable
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 

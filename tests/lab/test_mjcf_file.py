@@ -212,6 +212,8 @@ def test_a_body_is_left_out_by_name(tmp_path: Path, refused, capsys) -> None:
     for without in (["ghots"], ["ghost", "ghost"]):
         with refused(file, "without", "'ghost'"):
             converted(file, without=without)
+    with refused(file, "unit", "'cm'"):
+        converted(file, unit="cm")
     made = tmp_path / "a.yaml"
     assert main(["structure", str(file), "--without", "ghost", "aim", "--out", str(made)]) == 0
     assert read_structure(made).nodes == structure.nodes

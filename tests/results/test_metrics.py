@@ -87,23 +87,6 @@ def test_turning_and_bending_count_from_their_instants(robot: Robot) -> None:
     assert walked(robot, 0.0, path=line, steady_from=0.0).path_radius == math.inf
 
 
-def test_totals_become_metrics(robot: Robot) -> None:
-    metrics = walked(robot, 0.24)
-    # Four signals: the mean square is 48 N²/s in 12 s and four signals, 1 N²/s². Eight driven
-    # cables in 12 s: the integrals are over 96 s of actuators.
-    expected = {"speed": 0.02, "actuator_work": 0.3, "signal_rate": 1.0, "lifted": 2.0 / 12.0}
-    expected |= {"clearance": 0.01, "tension": 1.0, "rolled": 7.0, "travelling_index": 0.0}
-    expected |= {"peak_actuator_force": 4.0, "mean_actuator_force": 1.0}
-    expected |= {"peak_actuator_speed": 0.2, "mean_actuator_speed": 0.05}
-    expected |= {"peak_actuator_power": 0.5, "mean_actuator_power": 0.25}
-    assert {name: getattr(metrics, name) for name in expected} == pytest.approx(expected)
-    assert metrics.lifted_shares == pytest.approx(np.arange(5) / 12.0)
-    assert math.isnan(metrics.actuator_limited), "forces have no limits"
-    phases = 0.5 * np.pi * (np.arange(48)[:, None] / 4.0 - np.arange(4.0))
-    travelling = walked(robot, 0.24, signals=np.sin(phases))
-    assert travelling.travelling_index == pytest.approx(1.0)
-
-
 def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(robot: Robot) -> None:
     backward, standing = walked(robot, -0.24), walked(robot, 0.0)
     assert backward.cost_of_transport == pytest.approx(0.3 / (robot.weight * 0.24))

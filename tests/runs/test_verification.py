@@ -13,21 +13,6 @@ LEAST = 1e-10
 """Errors below this are of rounding."""
 
 
-def check(name: str, engine: str) -> None:
-    """The error at the engine's defaults is at most three times what is written, or it fails."""
-    known = RESULTS[name]["engines"][engine]
-    if engine == "all":
-        error = verification.verified(name)["engines"]["all"]["error"]
-    else:
-        fails = pytest.raises(SimulationFailure) if "failure" in known else nullcontext()
-        with fails:
-            default = verification.ENGINES[engine]["default"]
-            error = verification.run(verification.PROBLEMS[name], default)["error"]
-        if "failure" in known:
-            return
-    assert error <= max(3.0 * known["error"], LEAST), (name, engine)
-
-
 def test_the_page_has_every_problem_with_its_engines_or_a_reason():
     page = (verification.HERE / "README.md").read_text("utf-8")
     assert {*RESULTS} == {*verification.PROBLEMS}
@@ -49,7 +34,18 @@ SLOW = {name: [] if name in QUICK else [pytest.mark.slow] for name in RESULTS}
     [pytest.param(n, e, marks=SLOW[n]) for n in RESULTS for e in RESULTS[n]["engines"]],
 )
 def test_an_error_is_as_on_the_page(name, engine):
-    check(name, engine)
+    """The error at the engine's defaults is at most three times what is written, or it fails."""
+    known = RESULTS[name]["engines"][engine]
+    if engine == "all":
+        error = verification.verified(name)["engines"]["all"]["error"]
+    else:
+        fails = pytest.raises(SimulationFailure) if "failure" in known else nullcontext()
+        with fails:
+            default = verification.ENGINES[engine]["default"]
+            error = verification.run(verification.PROBLEMS[name], default)["error"]
+        if "failure" in known:
+            return
+    assert error <= max(3.0 * known["error"], LEAST), (name, engine)
 
 
 def test_the_engines_have_the_orders_of_their_methods():

@@ -14,21 +14,6 @@ from tetra_drake.robot.parameter_space import seeded_gait
 from tetra_drake.visualization.live import FRAMES_PER_SECOND, LiveView, open_view
 
 
-class FakeTime:
-    """A clock that sleeping advances, and each look at it by `look` s."""
-
-    def __init__(self, look):
-        self.now, self.look, self.slept = 1000.0, look, 0.0
-
-    def monotonic(self):
-        self.now += self.look
-        return self.now
-
-    def sleep(self, seconds):
-        self.now += seconds
-        self.slept += seconds
-
-
 @pytest.fixture
 def short(scenario):
     return shortly(scenario, 0.3, robot__tetrahedra=2)
@@ -36,12 +21,18 @@ def short(scenario):
 
 @pytest.mark.parametrize(("look", "slept"), [(0.0, 0.3), (1.0, 0.0)], ids=["fast", "slow"])
 def test_frames_are_shown_in_real_time(short, meshcat, look, slept, monkeypatch):
-    time = FakeTime(look)
+    time = Mock()
+
+    def rested():
+        return sum(nap.args[0] for nap in time.sleep.call_args_list)
+
+    # Sleeping advances the clock, and each look at it by `look` s.
+    time.monotonic.side_effect = lambda: look * time.monotonic.call_count + rested()
     monkeypatch.setattr("tetra_drake.visualization.live.time", time)
     monkeypatch.setattr(Meshcat, "GetNumActiveConnections", lambda _: 1)  # a browser
     view = Mock(wraps=LiveView(meshcat, short))
     simulate(scenario=short, gait=seeded_gait(short), viewer=view)
-    assert slept - 1.0 / FRAMES_PER_SECOND <= time.slept <= slept
+    assert slept - 1.0 / FRAMES_PER_SECOND <= rested() <= slept
     times = np.array([call.args[0]["time"].values[0] for call in view.show.call_args_list])
     assert times[0] == 0.0 and len(times) <= 0.3 * FRAMES_PER_SECOND + 1
     # A frame is due every 33 ms and comes with the end of a step, which takes 12 ms at most.

@@ -80,7 +80,7 @@ def observe_states(
         update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
         for i in range(drives.shape[1]):
             forces.drives[i, DRIVE] = drives[k, i]
-        compute_forces(robot, state, modes, signals[k], forces, generalized)
+        compute_forces(robot, state, modes, signals[k], True, forces, generalized)
         observe(tally, robot, times[k], signals[k], forces)
         if (k + 1) % CLEARED == 0 or k + 1 == times.size:
             update_clearance(tally, robot, state, forces.nodes)

@@ -439,7 +439,7 @@ def compute_forces_at_rest(parts: Parts, state: Table, modes: Table, generalized
     robot, forces = unpacked(parts)
     move_robot(robot, state, forces)
     update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
-    compute_forces(robot, state, modes, np.zeros(1), forces, generalized)
+    compute_forces(robot, state, modes, np.zeros(1), True, forces, generalized)
 
 
 def displaced(robot: Unactuated, state: np.ndarray, step: np.ndarray) -> np.ndarray:

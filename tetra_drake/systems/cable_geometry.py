@@ -23,12 +23,12 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     LeafSystem_,
+    System,
     SystemScalarConverter,
 )
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from tetra_drake.robot.structure import PASSIVE_COLOUR
-from tetra_drake.systems.cable_network import CableNetwork
 
 PIECES, SHARE = 4, 0.4
 """Number of cylinders that show a cable, and their length divided by the cable's length at the
@@ -95,14 +95,12 @@ class Cylinders(NamedTuple):
 
 
 def AddCableGeometry(
-    builder: DiagramBuilder, scene_graph: SceneGraph, cables: CableNetwork, lengths: np.ndarray
+    builder: DiagramBuilder, scene_graph: SceneGraph, cables: System, lengths: Mapping[str, float]
 ) -> None:
-    """Shows cables in a scene. `lengths` (pieces,) in m are those of their straight pieces at the
-    start."""
+    """Shows the cables of a CableNetwork in a scene. `lengths` has the length (m) of each of its
+    `pieces` at the start."""
     source = scene_graph.RegisterSource(cables.get_name())
-    cylinders = RegisterCylinders(
-        scene_graph, source, lengths=dict(zip(cables.pieces, lengths.tolist(), strict=True))
-    )
+    cylinders = RegisterCylinders(scene_graph, source, lengths=lengths)
     name = f"{cables.get_name()}_geometry"
     shown = builder.AddNamedSystem(name, CableGeometry_[float](cylinders))
     builder.Connect(cables.GetOutputPort("ends"), shown.get_input_port())

@@ -309,7 +309,8 @@ def AddCables(
     if scene_graph is not None and names:
         from tetra_drake.systems.cable_geometry import AddCableGeometry
 
-        AddCableGeometry(builder, scene_graph, network, np.concatenate(pieces))
+        shown = dict(zip(network.pieces, itertools.chain.from_iterable(pieces), strict=True))
+        AddCableGeometry(builder, scene_graph, network, shown)
     return network
 
 

@@ -162,8 +162,8 @@ def MakeTensegrityDiagram(
         from tetra_drake.systems.cable_geometry import AddCableGeometry
 
         ends = node_positions(structure, structure.initial_state)[robot.model.cables.pieces]
-        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        AddCableGeometry(builder, scene, cables, lengths)
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).tolist()
+        AddCableGeometry(builder, scene, cables, dict(zip(cables.pieces, lengths, strict=True)))
     if ground is None:
         ground = AddGroundContact(
             builder,

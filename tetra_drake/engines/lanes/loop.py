@@ -181,7 +181,7 @@ def iterate(constants: Constants, lanes: LaneState, log: Log) -> bool:
     for i in range(lanes.drives.shape[0]):
         forces.drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE]
     contact.update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
-    compute_forces(robot, state, lanes.modes, lanes.signals, forces, lanes.step.force)
+    compute_forces(robot, state, lanes.modes, lanes.signals, True, forces, lanes.step.force)
     observe(lanes.tally, robot, clock[TIME], lanes.signals, forces)
 
     step = select(is_running, aim(constants, lanes), 0.0)
@@ -192,7 +192,8 @@ def iterate(constants: Constants, lanes: LaneState, log: Log) -> bool:
     for i in range(drives.shape[0]):  # predicted, for the forces at the end of the step
         drives[i, actuator.RATE] = at_end[i, actuator.RATE]
         at_end[i, actuator.DRIVE] = drives[i, actuator.DRIVE] + step * drives[i, actuator.RATE]
-    error = take_step(robot, constants.solver, lanes.step, lanes.modes, forces, step)
+    solver, live = constants.solver, constants.is_live
+    error = take_step(robot, solver, lanes.step, lanes.modes, forces, step, live)
     for i in range(drives.shape[0]):  # corrected, with the mean of the rates at both ends
         rate = 0.5 * (drives[i, actuator.RATE] + at_end[i, actuator.RATE])
         lanes.end_drives[i] = drives[i, actuator.DRIVE] + step * rate

@@ -55,13 +55,20 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 @merged
 def take_step(
-    robot: Model, solver: Solver, work: StepMemory, modes: Table, forces: Forces, step: Real
+    robot: Model,
+    solver: Solver,
+    work: StepMemory,
+    modes: Table,
+    forces: Forces,
+    step: Real,
+    write_parts: bool,
 ) -> Real:
     """Writes the end of a step of length `step` (s) to `work.end`. Returns an estimate of its
     error.
 
     Input: `work.state`; `work.force` and `forces`, both computed for this state; and
-    `work.end_signals`. `forces` is overwritten by the forces in stage 2 of ROS2.
+    `work.end_signals`. `forces` is overwritten; with `write_parts` it holds the forces of cables
+    and ground in stage 2 of ROS2.
 
     The error is the difference to the embedded first-order solution: the largest difference of a
     velocity (m/s) of a body or, for rotations, of its nodes. NaN if a velocity is NaN.
@@ -82,7 +89,7 @@ def take_step(
     for i in range(size):
         velocity[i] = end[first + i] = state[first + i]
     move_bodies(state, velocity, step, end)
-    compute_end_forces(robot, work, modes, forces)
+    compute_end_forces(robot, work, modes, forces, False)
     for i in range(size):
         work.change[i] = GAMMA * (work.end_force[i] - work.force[i])
         k1[i] = work.force[i] + work.change[i]
@@ -92,7 +99,7 @@ def take_step(
         q1[i] = velocity[i] + scaled * k1[i]
         end[first + i] = velocity[i] + step * k1[i]
     move_bodies(state, q1, step, end)
-    compute_end_forces(robot, work, modes, forces)
+    compute_end_forces(robot, work, modes, forces, write_parts)
     for body in range(bodies):
         gained = momentum(robot, work.inertia, k1, body)
         for j in range(BLOCK):
@@ -110,16 +117,18 @@ def take_step(
 
 
 @inlined
-def compute_end_forces(robot: Model, work: StepMemory, modes: Table, forces: Forces) -> None:
+def compute_end_forces(
+    robot: Model, work: StepMemory, modes: Table, forces: Forces, write_parts: bool
+) -> None:
     """Writes the generalized forces (6*bodies,) at the state work.end to work.end_force.
 
     Torques are converted to the mass matrix at the beginning of the step: the angular accelerations
-    stay the same. `modes` are the contact modes during the step. `forces` then holds all forces
-    there.
+    stay the same. `modes` are the contact modes during the step. `forces` is working memory;
+    with `write_parts` it then holds the forces of cables and ground.
     """
     force = work.end_force
     move_robot(robot, work.end, forces)
-    compute_forces(robot, work.end, modes, work.end_signals, forces, force)
+    compute_forces(robot, work.end, modes, work.end_signals, write_parts, forces, force)
     if robot.isotropic:
         return
     for body in range(force.size // BLOCK):

@@ -12,9 +12,17 @@ from tetra_drake.kernels.lanes import FieldArray, lane_table
 def numbers_of(values: Any) -> np.ndarray:
     """All numbers of the float64 arrays in nested NamedTuples, in one row (numbers,), field after
     field. Arrays of indices are left out."""
-    if isinstance(values, tuple):
-        return np.concatenate([np.zeros(0), *map(numbers_of, values)])
-    return values.ravel() if _is_real(values) else np.zeros(0)
+    tables = [np.zeros(0)]
+
+    def collect(value: Any) -> None:
+        if isinstance(value, tuple):
+            for part in value:
+                collect(part)
+        elif _is_real(value):
+            tables.append(value.ravel())
+
+    collect(values)
+    return np.concatenate(tables)
 
 
 def shared(values: Any) -> Any:

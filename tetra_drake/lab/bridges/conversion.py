@@ -28,6 +28,8 @@ def converted(
         InputError: names file and key.
     """
     if format_of(file) == "MuJoCo":
+        if unit is not None:
+            raise InputError(file, "unit", f"found {unit!r:.60}; files of MuJoCo are in m")
         return structure_of(mjcf_tree(file, without=without), file)
     if without:
         problem = f"found {', '.join(without)}, expected bodies of a file of MuJoCo"

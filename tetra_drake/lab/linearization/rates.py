@@ -37,5 +37,5 @@ def compute_acceleration(
     of the actuators."""
     robot, forces = unpacked(parts)
     move_robot(robot, state, forces)
-    compute_forces(robot, state, modes, signals, forces, acceleration)
+    compute_forces(robot, state, modes, signals, True, forces, acceleration)
     accelerate(robot, forces.inertia, acceleration, acceleration)
