@@ -65,7 +65,7 @@ def setting(label: str, given: Any, key: str) -> str:
     return f"- {label}: {given}, `{key}`{'' if same else f', **not** {ours}'}"
 
 
-def over_trials(values: pandas.Series | xarray.DataArray, digits: int = 2) -> str:
+def over_trials(values: pandas.Series, digits: int = 2) -> str:
     """Mean and range of numbers of the trials."""
     return over([values.mean(), values.min(), values.max()], digits)
 
@@ -165,7 +165,8 @@ def motion_errors(run: Run, engines: Iterable[str]) -> list[str]:
     """Greatest error (in) of a node's place on each engine beside a fine one, over the best gaits
     of a run."""
     exact, *others = (motions(run, engine) for engine in (FINE, *engines))
-    return [over_trials(abs(each - exact).max(["time", "node", "axis"]) / INCH) for each in others]
+    apart = [abs(each - exact).max(["time", "node", "axis"]) / INCH for each in others]
+    return [over_trials(each.to_series()) for each in apart]
 
 
 def widths(*pictures: str) -> list[int]:
