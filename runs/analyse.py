@@ -8,6 +8,7 @@ Writes analysis.json to each run's folder, for tables.py.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -68,6 +69,9 @@ TURNED = "heading_change"
 SHOWN = ("cost_of_transport", "tension", "clearance")
 """Metrics of the best gaits that are shown on pages."""
 
+ENGINES = ("compiled", "diagram", "MuJoCo")
+"""Engines that pages compare."""
+
 SPEED = "relative_speed"
 """Metric of the best gaits that is shown in the gallery: body lengths per second."""
 
@@ -99,16 +103,22 @@ class Analysis:
         """The trial with the fittest gait."""
         return int(self.best_gaits["fitness"].idxmax())
 
-    def again(self, trial: int, setting: str, what: str = "distance_in") -> float:
-        """Distance (in) or TURNED of a trial's fittest gait with a setting; NaN if it was not
-        simulated."""
-        table = self.resimulations
-        found = table[what].to_numpy()[(table["trial"] == trial) & (table["setting"] == setting)]
-        return float(found[0]) if len(found) else math.nan
+    @property
+    def distances(self) -> pandas.DataFrame:
+        """Distances (in) of the fittest gaits; NaN if not simulated. Index: trial. Columns:
+        ENGINES."""
+        return self._on_engines("distance_in", self.disturbed["undisturbed"] / INCH)
 
-    def undisturbed(self, trial: int) -> float:
-        """Distance (in) of a trial's fittest gait on the compiled engine."""
-        return float(self.disturbed.loc[trial, "undisturbed"]) / INCH
+    @property
+    def turns(self) -> pandas.DataFrame:
+        """TURNED (rad) of the fittest gaits; as `distances`."""
+        return self._on_engines(TURNED, self.best_gaits[TURNED])
+
+    def _on_engines(self, what: str, compiled: pandas.Series) -> pandas.DataFrame:
+        others = self.resimulations.pivot(index="trial", columns="setting", values=what)
+        table = others.reindex(columns=[TIGHT, MUJOCO])
+        table.insert(0, "compiled", compiled)
+        return table.set_axis(ENGINES, axis="columns")
 
 
 def load_analysis(directory: Path) -> Analysis:
@@ -132,14 +142,13 @@ def analyse(directory: Path, *, workers: int) -> None:
     scenario = run.scenario
     run.fittest()  # InputError if there is none
     best = best_gaits(run)
-    gaits = {row["trial"]: run.gait(row["trial"], row["evaluation"]) for row in best}
-    for row, change in zip(best, sensitivity(scenario, [*gaits.values()], workers), strict=True):
-        row["sensitivity_in"] = json_number(change)
+    gaits = {trial: run.gait(trial, number) for trial, number in best["evaluation"].items()}
+    best["sensitivity_in"] = sensitivity(scenario, [*gaits.values()], workers)
     judgement = robustness(scenario, gaits, percent=PERCENT, alone=False, workers=workers)
     content = {
         "schema": SCHEMA,
         "versions": versions(),
-        "best_gaits": best,
+        "best_gaits": json_rows(best),
         "resimulations": resimulate(scenario, gaits, workers),
         "unseen": on_unseen_ground(scenario, gaits, workers),
         "disturbed": json_rows(by_gait(judgement)),
@@ -148,13 +157,12 @@ def analyse(directory: Path, *, workers: int) -> None:
     write_whole(directory / ANALYSIS, text + "\n")
 
 
-def best_gaits(run: Run) -> list[dict[str, Any]]:
-    """Table of the fittest gait of each trial; see Analysis."""
-    best = run.best().rename(columns={"index": "evaluation"})
-    made = {status.number: status.evaluations for status in run.statuses}
-    best = best.assign(evaluations=best["trial"].map(made)).set_index("trial")
-    names = ["evaluation", "evaluations", "fitness", *SHOWN, SPEED, *_turned(run.scenario)]
-    return json_rows(best[names])
+def best_gaits(run: Run) -> pandas.DataFrame:
+    """Table of the fittest gait of each trial, without sensitivity; see Analysis."""
+    names = ["index", "fitness", *SHOWN, SPEED, *_turned(run.scenario)]
+    best = run.best().set_index("trial")[names].rename(columns={"index": "evaluation"})
+    best.insert(1, "evaluations", run.evaluations.groupby("trial").size())
+    return best
 
 
 def _turned(scenario: Scenario) -> list[str]:
@@ -172,34 +180,31 @@ def sensitivity(scenario: Scenario, gaits: Sequence[Gait], workers: int) -> list
     directions[:, :, 2] = np.abs(directions[:, :, 2])  # not into the ground
     starts = [Draw({}), *(Draw({}, moves=DISPLACEMENT * each) for each in directions)]
     compiled = scenario.on_engine("compiled")
-    walks = outcomes([disturbed(compiled, start) for start in starts], gaits, workers)
-    undisplaced, *displaced = np.array(
-        [[measured(each, "distance_in") for each in of_gait] for of_gait in walks]
-    ).T
-    largest: list[float] = np.abs(displaced - undisplaced).max(axis=0).tolist()
+    moved = {number: disturbed(compiled, start) for number, start in enumerate(starts)}
+    found = walks(moved, dict(enumerate(gaits)), workers)
+    inches = np.reshape([measured(walk, "distance_in") for *_, walk in found], (-1, len(gaits)))
+    largest: list[float] = np.abs(inches[1:] - inches[0]).max(axis=0).tolist()
     return largest
 
 
-def outcomes(
-    scenarios: Sequence[Scenario], gaits: Sequence[Gait], workers: int
-) -> list[list[Outcome]]:
-    """Results, or failures, of each gait on all scenarios."""
-    every = [gait for gait in gaits for _ in scenarios]
-    found = simulate_many([*scenarios] * len(gaits), every, workers=workers)
-    return [found[i : i + len(scenarios)] for i in range(0, len(found), len(scenarios))]
+def walks(
+    scenarios: Mapping[Any, Scenario], gaits: Mapping[int, Gait], workers: int
+) -> list[tuple[Any, int, Outcome]]:
+    """Results, or failures, of all gaits on each scenario, with the keys of scenario and gait."""
+    pairs = [*itertools.product(scenarios, gaits)]
+    on, by = [scenarios[key] for key, _ in pairs], [gaits[trial] for _, trial in pairs]
+    found = simulate_many(on, by, workers=workers)
+    return [(*pair, walk) for pair, walk in zip(pairs, found, strict=True)]
 
 
 def resimulate(scenario: Scenario, gaits: Mapping[int, Gait], workers: int) -> list[dict[str, Any]]:
     """Table of the gaits with every setting; see Analysis."""
     rows = []
-    for name, changed in settings_of(scenario).items():
-        walks = outcomes([changed], [*gaits.values()], workers)
-        for trial, (walk,) in zip(gaits, walks, strict=True):
-            row: dict[str, Any] = {"trial": trial, "setting": name}
-            for metric in ("distance_in", *_turned(scenario)):
-                row[metric] = json_number(measured(walk, metric))
-            failure = None if isinstance(walk, SimulationResult) else str(walk)
-            rows.append(row | {"failure": failure})
+    names = ["distance_in", *_turned(scenario)]
+    for setting, trial, walk in walks(settings_of(scenario), gaits, workers):
+        metrics = {name: json_number(measured(walk, name)) for name in names}
+        failure = None if isinstance(walk, SimulationResult) else str(walk)
+        rows.append({"trial": trial, "setting": setting} | metrics | {"failure": failure})
     return rows
 
 
@@ -211,15 +216,14 @@ def on_unseen_ground(
     if not isinstance(scenario.terrain, Rough):
         return []
     rows: list[dict[str, Any]] = []
-    scenarios = [scenario.with_changes({"terrain.seed": seed}) for seed in UNSEEN]
-    for trial, walks in zip(gaits, outcomes(scenarios, [*gaits.values()], workers), strict=True):
-        for seed, walk in zip(UNSEEN, walks, strict=True):
-            is_met = isinstance(walk, SimulationResult) and not unmet_requirements(
-                walk.metrics, scenario.require
-            )
-            inches = json_number(measured(walk, "distance_in"))
-            rows.append({"trial": trial, "seed": seed, "distance_in": inches, "met": is_met})
-    return rows
+    scenarios = {seed: scenario.with_changes({"terrain.seed": seed}) for seed in UNSEEN}
+    for seed, trial, walk in walks(scenarios, gaits, workers):
+        is_met = isinstance(walk, SimulationResult) and not unmet_requirements(
+            walk.metrics, scenario.require
+        )
+        inches = json_number(measured(walk, "distance_in"))
+        rows.append({"trial": trial, "seed": seed, "distance_in": inches, "met": is_met})
+    return sorted(rows, key=lambda row: row["trial"])
 
 
 def settings_of(scenario: Scenario) -> dict[str, Scenario]:

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import page
+import pandas
 import xarray
 from scipy.spatial.transform import Rotation
 from script import evolved, read_record, script
@@ -60,17 +61,11 @@ def phase_lags(times: np.ndarray, waves: np.ndarray, frequency: float) -> np.nda
     return -np.angle(components[1:] / components[:-1]) / math.tau
 
 
-def correlation(cause: np.ndarray, effect: np.ndarray, lag: int) -> float:
-    """Correlation of two signals, the second taken `lag` samples later."""
-    if lag < 0:
-        return correlation(effect, cause, -lag)
-    return float(np.corrcoef(cause[: len(cause) - lag], effect[lag:])[0, 1])
-
-
 def delay(cause: np.ndarray, effect: np.ndarray, most: int) -> tuple[float, float]:
     """Delay of a signal behind another in samples, at most `most`, and their correlation there. A
     parabola through the greatest correlation and its neighbours gives parts of a sample."""
-    values = [correlation(cause, effect, lag) for lag in range(-most, most + 1)]
+    signal, late = pandas.Series(cause), pandas.Series(effect)
+    values = [signal.corr(late.shift(-lag)) for lag in range(-most, most + 1)]
     top = int(np.argmax(values[1:-1])) + 1
     before, at, after = values[top - 1 : top + 2]
     return top - most + 0.5 * (before - after) / (before - 2.0 * at + after), at
@@ -95,7 +90,7 @@ def rhythm(trajectory: xarray.Dataset) -> dict[str, Any]:
         "lags": phase_lags(times, speeds, frequency),
         "uneven": speeds.std(axis=0) / speeds.mean(axis=0),
         "backward": 100.0 * (speeds < 0.0).mean(axis=0),
-        "again": [correlation(speed, speed, later) for speed in speeds.T],
+        "again": [pandas.Series(speed).autocorr(later) for speed in speeds.T],
     }
 
 

@@ -31,7 +31,6 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.formatting import fixed, listed
 from tetra_drake.machine import available_cores
-from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.settings.units import INCH
 
 EVALUATIONS, ON_DIAGRAM = 300, 60
@@ -63,9 +62,9 @@ def first_difference(run: Run) -> str:
     differ."""
     most = ON_DIAGRAM if run.scenario.engine_name == "drake" else EVALUATIONS
     trial, vectors = made(run, 0), asked(run, 0, most)
-    genomes = run.with_parameters.query("trial == 0 and index < @most")["index"].astype(int)
-    alike = [np.allclose(vectors[i], run.vector(0, i), rtol=PARAMETERS, atol=0.0) for i in genomes]
-    kept, iterations = genomes.tolist(), trial["iteration"].astype(int)
+    kept = run.with_parameters.query("trial == 0 and index < @most")["index"].tolist()
+    alike = [np.allclose(vectors[i], run.vector(0, i), rtol=PARAMETERS, atol=0.0) for i in kept]
+    iterations = trial["iteration"].astype(int)
     evaluate = GaitEvaluation(run.scenario)
     with evaluator_of(evaluate, workers=available_cores(), warn=print) as evaluator:
         tasks = [
@@ -74,17 +73,13 @@ def first_difference(run: Run) -> str:
         ]
         found = {task.index: evaluation for task, evaluation in evaluate_all(evaluator, tasks)}
     for index in kept:
-        before, now = trial.loc[index, "distance_in"], distance_in(found[index])
+        before = trial.loc[index, "distance_in"]
+        now = found[index].metrics.get("distance", math.nan) / INCH
         if goes_elsewhere(run, index, before, now):
             return f"evaluation {index} goes {fixed(now, 3)} in, not {fixed(before, 3)} in"
     if all(alike):
         return ""
     return f"search differs at evaluation {kept[alike.index(False)]} or earlier"
-
-
-def distance_in(evaluation: Evaluation) -> float:
-    """Distance (in) of a gait; NaN of a failure."""
-    return evaluation.metrics.get("distance", math.nan) / INCH
 
 
 def goes_elsewhere(run: Run, index: int, before: float, now: float) -> bool:

@@ -10,9 +10,9 @@ finished readings are skipped. `python runs/thesis_page.py` shows the numbers.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas
@@ -55,10 +55,8 @@ def run_of(name: str) -> Run:
 
 def last_iteration(means: Sequence[float], settings: SteadyState) -> int:
     """Iteration after which a trial with these mean fitnesses stops."""
-    for iteration in range(len(means)):
-        if has_levelled_off(means[: iteration + 1], settings):
-            return iteration
-    return len(means) - 1
+    stops = (i for i in range(len(means)) if has_levelled_off(means[: i + 1], settings))
+    return next(stops, len(means) - 1)
 
 
 def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
@@ -95,25 +93,25 @@ def numbers(name: str) -> list[dict[str, float]]:
 # How near a reading is to the thesis.
 
 
-def results(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> dict[str, np.ndarray]:
-    """Results (...) of our trials, by the names in THESIS. `drawn` (..., trials) has the rows that
-    count, with repetitions; by default each row counts once."""
-    rows = np.arange(len(trials)) if drawn is None else drawn
-    initial, best = (trials[name].to_numpy()[rows] for name in ("initial_best_in", "best_in"))
+def results(trials: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Results (...) of our trials, by the names in THESIS. `trials` is their table, or the columns
+    (..., trials) of several."""
+    names = "initial_best_in", "best_in", "backward"
+    initial, best, backward = (np.asarray(trials[name]) for name in names)
     rise, longest = best / initial, best.argmax(axis=-1)[..., np.newaxis]
     return {
         "initial": initial.max(axis=-1),
-        "backward": trials["backward"].to_numpy()[rows].mean(axis=-1),
+        "backward": backward.mean(axis=-1),
         "evolved": best.max(axis=-1),
         "rise": rise.mean(axis=-1),
         "best_rise": np.take_along_axis(rise, longest, axis=-1)[..., 0],
     }
 
 
-def factor(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> np.ndarray:
+def factor(trials: Mapping[str, Any]) -> np.ndarray:
     """Factor (...) by which our results differ from THESIS: the exponential of the root mean square
-    of the logarithms of their ratios. `drawn` is as for results()."""
-    ours = results(trials, drawn)
+    of the logarithms of their ratios. `trials` is as for results()."""
+    ours = results(trials)
     ratios = [np.maximum(ours[key], 1e-3) / THESIS[key] for key in THESIS]
     return np.asarray(np.exp(np.sqrt(np.mean(np.square(np.log(ratios)), axis=0))))
 
@@ -121,7 +119,7 @@ def factor(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> np.ndar
 def factor_interval(trials: pandas.DataFrame) -> tuple[float, float]:
     """95 % interval of the factor, by bootstrap over the trials."""
     drawn = resampled(np.arange(len(trials)), np.random.default_rng(0))[:500]
-    return interval_of_resamples(factor(trials, drawn=drawn))
+    return interval_of_resamples(factor({name: trials[name].to_numpy()[drawn] for name in trials}))
 
 
 def load_tables() -> dict[str, pandas.DataFrame]:

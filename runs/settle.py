@@ -24,12 +24,11 @@ def numbers(analysis: Analysis) -> dict[str, np.ndarray]:
     }
     if len(analysis.unseen):
         unseen = analysis.unseen.fillna({"distance_in": 0.0})
-        unseen = unseen.assign(valid_in=unseen["distance_in"] * unseen["met"])
-        walks = unseen.groupby("trial")[["distance_in", "met", "valid_in"]].mean()
+        unseen["valid_in"] = unseen["distance_in"] * unseen["met"]
+        walks = unseen.assign(met=100.0 * unseen["met"]).groupby("trial").mean()
         by_name["mean distance on unseen ground, in"] = walks["distance_in"].to_numpy()
-        met, valid = 100.0 * walks["met"].to_numpy(), walks["valid_in"].to_numpy()
-        by_name["share of these walks that meet the requirements, %"] = met
-        by_name["mean distance, 0 where they are not met, in"] = valid
+        by_name["share of these walks that meet the requirements, %"] = walks["met"].to_numpy()
+        by_name["mean distance, 0 where they are not met, in"] = walks["valid_in"].to_numpy()
     return by_name
 
 

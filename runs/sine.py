@@ -44,17 +44,20 @@ def oscillators(amplitude: float, *, start_up: float = 1.25) -> str:
 
 def grid(space: ParameterSpace) -> list[Vector]:
     """Vectors of all sines in the space of such oscillators."""
-    places, vectors = [space.names.index(name) for name in ("frequency", "lag 1->2")], []
-    for frequency, lag in itertools.product(FREQUENCIES, np.radians(LAGS)):
-        vectors.append(space.low.copy())
-        vectors[-1][places] = frequency, lag
-    return vectors
+    vectors = np.tile(space.low, (TRIED, 1))
+    places = [space.names.index(name) for name in ("frequency", "lag 1->2")]
+    vectors[:, places] = [*itertools.product(FREQUENCIES, np.radians(LAGS))]
+    return [*vectors]
+
+
+def steady_times(scenario: Scenario) -> np.ndarray:
+    """Times (s) after the first 5 s, every PERIOD."""
+    return np.arange(5.0, scenario.simulation.duration, PERIOD)
 
 
 def steady_signals(robot: Robot, gait: Gait) -> np.ndarray:
-    """Signals (times, oscillators) in N of a gait after the first 5 s, every PERIOD."""
-    times = np.arange(5.0, robot.scenario.simulation.duration, PERIOD)
-    return DrivenRobot.of(robot, gait).signals_at(times)
+    """Signals (times, oscillators) in N of a gait at the steady times."""
+    return DrivenRobot.of(robot, gait).signals_at(steady_times(robot.scenario))
 
 
 def peak(scenario: Scenario, gait: Gait) -> float:

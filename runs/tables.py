@@ -13,13 +13,13 @@ from __future__ import annotations
 import functools
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas
-from analyse import DRAWN, MUJOCO, SPEED, TIGHT, TURNED, Analysis, load_analysis
+from analyse import DRAWN, SPEED, Analysis, load_analysis
 from page import rendered
 from parting import partings
 from PIL import Image
@@ -29,6 +29,7 @@ from script import script
 from settle import settled
 from sine import TRIED, load_sines
 
+from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import load_run
 from tetra_drake.files import read_text, write_whole
@@ -43,20 +44,17 @@ HERE = Path(__file__).parent
 FRONT = HERE.parent
 """Folder of the project's README."""
 README = "README.md"
+BEGIN, END = "<!--tables.py:", "<!--end-->"
+"""What stands before the name of a table in a page, and after the table."""
 
 APART = 0.3 * INCH
 """Largest difference (m) of distances on two engines that a page does not mention."""
-
-ENGINES = ("compiled", "diagram", "MuJoCo")
 
 OTHERS = {"undulation": "undulation-four", "rough-feedback": "rough"}
 """Runs with which others are compared on their pages."""
 
 FAR = 5.0
 """Distance (in) from which a gait walks; of less, a difference in percent says little."""
-
-_TABLE = re.compile(r"(?P<begin><!--tables.py:(?P<name>\S+)-->)\n.*?<!--end-->", re.DOTALL)
-
 
 Runs = Mapping[str, Analysis]
 """The analyses of recorded runs by name."""
@@ -90,9 +88,9 @@ class Best:
     """The best gait of a run for the gallery."""
 
     title: str
-    reached: Mapping[str, float]
-    """Distances (m) by ENGINES, or angles (rad) if the objective is about turning; NaN if not
-    simulated."""
+    reached: pandas.Series
+    """Distances (m) by analyse.ENGINES, or angles (rad) if the objective is about turning; NaN if
+    not simulated."""
     kept: float
     """Share of disturbed robots on which it does as well; NaN if it turns."""
     unit: float
@@ -115,7 +113,7 @@ class Best:
     @property
     def first(self) -> str:
         """The distance on the first engine with the range of all that are known, or the angle."""
-        value, low, high = np.array([self.reached[ENGINES[0]], *self.known]) / self.unit
+        value, low, high = np.array([self.reached["compiled"], *self.known]) / self.unit
         return uncertain(fixed(value, self.decimals), value, low, high) + self.unit_name
 
 
@@ -129,24 +127,15 @@ def best_gait(name: str, run: Analysis) -> Best:
     trial, title, scenario = run.best_trial, EXPERIMENTS[name].title, scenario_of(name)
     gait, draws = run.best_gaits.loc[trial], run.disturbed.loc[trial]
     if looks_for_turns(scenario.objective):
-        turns = [gait[TURNED], *(run.again(trial, each, TURNED) for each in (TIGHT, MUJOCO))]
-        by_engine = dict(zip(ENGINES, turns, strict=True))
-        return Best(title, by_engine, math.nan, math.radians(1.0), "°", decimals=0)
-    reached, changed = distances_of(run, trial), INCH * gait["sensitivity_in"]
+        return Best(title, run.turns.loc[trial], math.nan, math.radians(1.0), "°", decimals=0)
+    reached, changed = INCH * run.distances.loc[trial], INCH * gait["sensitivity_in"]
     # MuJoCo has Coulomb friction; under another law its distance is not one of this gait.
-    alike = reached if isinstance(scenario.friction, Coulomb) else reached[:2]
-    known = [*alike, reached[0] - changed, reached[0] + changed, *draws[list(DRAWN)]]
-    by_engine, units = dict(zip(ENGINES, reached, strict=True)), scenario.units
+    alike = reached if isinstance(scenario.friction, Coulomb) else reached.drop("MuJoCo")
+    compiled, units = reached["compiled"], scenario.units
+    known = [*alike, compiled - changed, compiled + changed, *draws[list(DRAWN)]]
     kept, name_of_unit = float(draws["kept"]), f" {units.length_name}"
     ends = np.nanmin(known), np.nanmax(known)
-    return Best(title, by_engine, kept, units.length, name_of_unit, 2, gait[SPEED], ends)
-
-
-def distances_of(run: Analysis, trial: int) -> np.ndarray:
-    """Distances (m) of a trial's fittest gait, in the order of ENGINES; NaN if not simulated."""
-    return INCH * np.array(
-        [run.undisturbed(trial), run.again(trial, TIGHT), run.again(trial, MUJOCO)]
-    )
+    return Best(title, reached, kept, units.length, name_of_unit, 2, gait[SPEED], ends)
 
 
 def gallery_table(runs: Runs) -> str:
@@ -162,18 +151,17 @@ def differences(runs: Runs) -> pandas.DataFrame:
     NaN for gaits that go less than FAR, or if not simulated), nanometre (in, in starts moved by
     1 nm). Runs with a policy are left out: a rover that rolls has chaotic impacts.
     """
-    rows = []
+    tables = {}
     for name, run in runs.items():
-        if scenario_of(name).policy is not None:
-            continue
-        for trial, gait in run.best_gaits.iterrows():
-            compiled, diagram, mujoco = distances_of(run, trial) / INCH
-            share = abs(mujoco / compiled - 1.0) if abs(compiled) >= FAR else math.nan
-            coulomb = isinstance(scenario_of(name).friction, Coulomb)
-            apart = abs(diagram - compiled), share, gait["sensitivity_in"]
-            rows.append([name, trial, coulomb, *apart])
-    columns = ["run", "trial", "coulomb", "diagram", "mujoco", "nanometre"]
-    return pandas.DataFrame(rows, columns=columns)
+        if scenario_of(name).policy is None:
+            table = run.distances
+            share = (table["MuJoCo"] / table["compiled"] - 1.0).abs()
+            table["mujoco"] = share.where(table["compiled"].abs() >= FAR)
+            table["diagram"] = (table["diagram"] - table["compiled"]).abs()
+            table["nanometre"] = run.best_gaits["sensitivity_in"]
+            tables[name] = table.assign(coulomb=isinstance(scenario_of(name).friction, Coulomb))
+    every = pandas.concat(tables, names=["run", "trial"]).reset_index()
+    return every[["run", "trial", "coulomb", "diagram", "mujoco", "nanometre"]]
 
 
 def trust_table(runs: Runs) -> str:
@@ -193,9 +181,7 @@ def trials_table(name: str, runs: Runs) -> str:
     """List of the fittest gaits of the trials of a run, on two engines and on disturbed robots.
     Below it, the trials with another distance on the diagram, and the farthest sine."""
     run, units = runs[name], scenario_of(name).units
-    trials, most = run.best_gaits.index, APART / units.length
-    by_engine = [distances_of(run, trial) / units.length for trial in trials]
-    rows = pandas.DataFrame(by_engine, index=trials, columns=ENGINES)
+    rows, most = run.distances * INCH / units.length, APART / units.length
     rows["kept"] = 100.0 * run.disturbed["kept"]
     apart = rows[~((rows["compiled"] - rows["diagram"]).abs() <= most)]
     sine = {"sine": load_sines().get(name), "tried": TRIED}
@@ -214,7 +200,8 @@ def pages(runs: Runs) -> list[Path]:
 
 
 def made_again(page: Path, runs: Runs) -> str:
-    """Text of a page with new tables. Raises InputError if the page cannot be read."""
+    """Text of a page with new tables. Raises InputError if the page cannot be read or a table has
+    no end, KeyError for an unknown table."""
     name = page.parent.name
     tables = {
         "results": lambda: results_table(runs),
@@ -224,23 +211,13 @@ def made_again(page: Path, runs: Runs) -> str:
         "settled": lambda: settled(HERE / OTHERS[name], HERE / name),
         "partings": lambda: partings_table(name, "thesis"),
     }
-    return filled(read_text(page, "page"), lambda table: tables[table]())
-
-
-def filled(text: str, make_table: Callable[[str], str]) -> str:
-    """A text with new tables between the marker lines.
-
-    Raises KeyError for an unknown table, ValueError for one without an end.
-    """
-
-    def remade(match: re.Match[str]) -> str:
-        if match[0].count("<!--tables.py:") > 1:
-            raise ValueError(f"table {match['name']} has no end before the next one")
-        return f"{match['begin']}\n\n{make_table(match['name']).rstrip()}\n\n<!--end-->"
-
-    text, tables = _TABLE.subn(remade, text)
-    if tables < text.count("<!--tables.py:"):
-        raise ValueError("the last table has no end")
+    text, *parts = read_text(page, "page").split(BEGIN)
+    for part in parts:
+        table, _, rest = part.partition("-->")
+        _, has_end, after = rest.partition(END)
+        if not has_end:
+            raise InputError(page, table, f"has no {END} before the next table or the page's end")
+        text += f"{BEGIN}{table}-->\n\n{tables[table]().rstrip()}\n\n{END}{after}"
     return text
 
 

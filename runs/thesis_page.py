@@ -24,7 +24,7 @@ from page import over, rendered
 from record import load_times
 from script import read_record, script
 from settle import difference_of_means
-from sine import TRIED, load_sines
+from sine import TRIED, load_sines, steady_signals, steady_times
 from tables import aspect, best_gait
 from thesis_figures import save_figures
 
@@ -32,9 +32,9 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import read_json, write_whole
 from tetra_drake.formatting import fixed, ranged, rounded
+from tetra_drake.lab.study.sweep import sweep
 from tetra_drake.robot.measures import dominant_frequency
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.section import flattened, written
 from tetra_drake.settings.units import INCH, POUND_FORCE, plainest
@@ -53,8 +53,6 @@ import sliding_tetrahedron  # noqa: E402
 ROW = 810
 """Width of two pictures beside each other, in pixels."""
 FINE = "!Compiled {tolerance: 1e-5 m/s, max_step: 1 ms}"
-STEADY = 5.0
-"""Time (s) from which on frequencies are measured."""
 DRAWS = 2000
 """Number of sets of random weights beside which the evolved weights are judged."""
 
@@ -72,11 +70,11 @@ def over_trials(values: pandas.Series, digits: int = 2) -> str:
     return over([values.mean(), values.min(), values.max()], digits)
 
 
-def two_best(run: Run, trial: int) -> pandas.Series:
-    """Absolute differences of fitness and parameters of the two best gaits of a trial, as in
+def two_best(run: Run) -> pandas.DataFrame:
+    """Absolute differences of fitness and parameters of the two best gaits of each trial, as in
     Table 8; they are in its last population. Gaits with the same parameters count once."""
-    best = run.best(2).query("trial == @trial").filter(regex="^(fitness$|weight |tau_)")
-    return best.diff().iloc[1].abs()
+    best = run.best(2).set_index("trial").filter(regex="^(fitness$|weight |tau_)")
+    return best.groupby("trial").diff().dropna().abs()
 
 
 def weights_pattern(run: Run) -> dict[str, str]:
@@ -102,23 +100,22 @@ def weights_pattern(run: Run) -> dict[str, str]:
 
 def trials_numbers(run: Run) -> dict[str, Any]:
     """Numbers of the thesis's chapter 3 from a run; readings.py has the rest."""
-    best, duration = run.best().set_index("trial"), run.scenario.simulation.duration
-    trial, robot = int(best["fitness"].idxmax()), Robot.of(run.scenario)
+    best, scenario = run.best().set_index("trial"), run.scenario
+    trial, robot = int(best["fitness"].idxmax()), Robot.of(scenario)
     iterations = run.iterations.groupby("trial")["iteration"].max()
     wall_time = load_times(HERE)[run.directory.name]["evolution"]["wall_s"]
     seconds = wall_time / iterations.sum()
-    times = np.arange(STEADY, duration, run.scenario.simulation.sample_period)
-    signals = [DrivenRobot.of(robot, gait).signals_at(times)[:, 0] for gait in run.gaits()]
+    signals = [steady_signals(robot, gait)[:, 0] for gait in run.gaits()]
+    times = steady_times(scenario)
     hertz = pandas.Series([dominant_frequency(times, signal) for signal in signals])
-    pairs = pandas.DataFrame({t: two_best(run, t) for t in best.index}).T
     return {
         "trial": trial,
         "initial": run.initial(),
         "best": best,
-        "pairs": pairs,
+        "pairs": two_best(run),
         "levelled": sum("levelled" in str(status.stop) for status in run.statuses),
         "seconds": rounded(seconds, 2),
-        "faster": f"{round(2.0 * duration / seconds, -2):,.0f}",
+        "faster": f"{round(2.0 * scenario.simulation.duration / seconds, -2):,.0f}",
         "trial_seconds": seconds * iterations,
         "hertz": hertz,
         "swing": fixed(np.ptp(signals[trial]) / POUND_FORCE),
@@ -157,19 +154,19 @@ def ground_numbers() -> dict[str, str]:
     }
 
 
-def motions(run: Run, engine: str) -> list[xarray.DataArray]:
+def motions(run: Run, engine: str) -> xarray.DataArray:
     """Places p_WN (m) of the nodes in the first 5 s, for the best gaits of a run on an engine."""
     scenario = run.scenario.with_changes({"simulation.duration": "5 s", "engine": engine})
-    return [simulate(scenario, gait, record=True).trajectory.p_WN for gait in run.gaits()]
+    walks = [simulate(scenario, gait, record=True).trajectory for gait in run.gaits()]
+    return xarray.concat([walk.p_WN for walk in walks], "gait")
 
 
 def motion_errors(run: Run, engines: Iterable[str]) -> list[str]:
     """Greatest error (in) of a node's place on each engine beside a fine one, over the best gaits
     of a run."""
     exact, *others = (motions(run, engine) for engine in (FINE, *engines))
-    pairs = [zip(each, exact, strict=True) for each in others]
-    errors = [[float(abs(a - b).max()) / INCH for a, b in each] for each in pairs]
-    return [over_trials(pandas.Series(each)) for each in errors]
+    apart = [abs(each - exact).max(["time", "node", "axis"]) / INCH for each in others]
+    return [over_trials(each.to_series()) for each in apart]
 
 
 def widths(*pictures: str) -> list[int]:
@@ -192,9 +189,8 @@ def apart(first: str, second: str) -> str:
 def without_slip(run: Run) -> str:
     """Distances of a run's best gaits if no node slips: the deflection is reset to 0 at the
     stiction range."""
-    scenario = run.scenario.with_changes({"friction.reset": "range"})
-    walks = [simulate(scenario, gait).metrics.distance_in for gait in run.gaits()]
-    return over_trials(pandas.Series(walks))
+    walks = sweep(run, run.gaits(), {"friction.reset": "range"})
+    return over_trials(walks["distance"].to_series() / INCH)
 
 
 def simulated_numbers(run: Run) -> dict[str, Any]:

@@ -108,7 +108,7 @@ def _that_matter(run: Run, initial: bool) -> set[tuple[int, int]]:
     first = run.evaluations[run.evaluations["trial"] == 0]
     early = [_rises(first), run.initial() if initial else first[first["iteration"] == 0]]
     chosen = [*early, run.best(BEST_GAITS), run.reevaluations, elites(run)]
-    return set().union(*map(_keys, chosen))
+    return _keys(pandas.concat(chosen))
 
 
 def _that_choose(scenario: Scenario) -> set[str]:
@@ -138,13 +138,11 @@ def _thinned(entry: Mapping[str, Any], metrics: Container[str]) -> dict[str, Any
 
 def _rounded(value: Any, digits: int) -> Any:
     """Rounds a number, or all numbers in lists and mappings."""
-    if isinstance(value, float):
-        return float(f"{round(value, _DECIMALS) + 0.0:.{digits}g}")
-    if isinstance(value, list):
-        return [_rounded(item, digits) for item in value]
-    if isinstance(value, dict):
-        return {key: _rounded(item, digits) for key, item in value.items()}
-    return value
+
+    def short(text: str) -> float:
+        return float(f"{round(float(text), _DECIMALS) + 0.0:.{digits}g}")
+
+    return json.loads(json.dumps(value), parse_float=short)
 
 
 def _write(

@@ -78,11 +78,10 @@ def energy_of(result: SimulationResult) -> tuple[Array, Array]:
     for body, (first, end) in enumerate(itertools.pairwise(structure.first_node)):
         q = seen.q_WB.values[:, body]
         unit = RotationalInertia(*structure.unit_inertia[body]).CopyToFullMatrix3()
-        for time, (p, v) in enumerate(zip(p_WN[:, first:end], v_WN[:, first:end], strict=True)):
-            rigid = rigid_motions(p - p_WB[time, body]).reshape(-1, 6)
-            w, speed = np.split(np.linalg.lstsq(rigid, v.ravel(), rcond=1e-9)[0], 2)
-            own = turned_back(q[time], w)
-            motion[time] += 0.5 * structure.mass[body] * (speed @ speed + own @ unit @ own)
+        rigid = rigid_motions(structure.p_BN[first:end]).reshape(-1, 6)
+        own = turned_back(q[:, np.newaxis], v_WN[:, first:end]).reshape(len(q), -1)
+        w, speed = np.split(np.linalg.lstsq(rigid, own.T, rcond=1e-9)[0], 2)
+        motion += 0.5 * structure.mass[body] * (speed**2 + w * (unit @ w)).sum(axis=0)
     return energy + motion, motion
 
 
