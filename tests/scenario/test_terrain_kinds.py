@@ -39,7 +39,7 @@ def spline(grid: Grid, x: np.ndarray, y: np.ndarray, nu: tuple[int, int] = (0, 0
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
 def test_the_surface_is_the_spline_of_the_heights_with_its_gradient(terrain):
     grid = grid_of(terrain)
-    base = SurfaceGrid.of(grid.heights, grid.corner, grid.cell, terrain.is_stepped)
+    base = SurfaceGrid.of(grid, is_stepped=terrain.is_stepped)
     for x, y in np.random.default_rng(0).uniform(-0.6, 0.7, (200, 2)):
         expected = [spline(grid, x, y, nu) for nu in ((0, 0), (1, 0), (0, 1))]
         found = surface(x, y, base, grid.heights.ravel())

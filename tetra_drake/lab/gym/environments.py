@@ -141,7 +141,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         frames_per_second = max(1, round(1.0 / simulation.control_period))
         self.metadata = {"render_modes": [_RENDERED], "render_fps": frames_per_second}
         self.metadata["autoreset_mode"] = self._autoreset
-        size, actions = self._observe(start).shape[1], self._groups.max() + 1
+        size, actions = self._observe(start).shape[1], int(self._groups.max()) + 1
         self.single_observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)
         self.single_action_space = spaces.Box(-1.0, 1.0, (actions,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -272,7 +272,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     def _setpoints(self, actions: np.ndarray) -> np.ndarray:
         """Setpoints (N, driven cables) of the actuators, in SI units, for actions (N, actions) of
         the environment. Each is a force, free length or tension, depending on the actuators."""
-        shape = self.num_envs, self._groups.max() + 1
+        shape = self.num_envs, int(self._groups.max()) + 1
         actions = checked_actions(actions, shape, source=_SOURCE)
         signals = self._scenario.cpg.usual_amplitude * actions[:, self._groups]
         return np.asarray(self._scenario.actuation.commands(self._cables._replace(signal=signals)))
