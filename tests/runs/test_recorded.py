@@ -61,7 +61,7 @@ def test_the_best_gaits_walk_as_recorded(name):
     """On the compiled engine, undisturbed, which is what analyse.py recorded, too."""
     folder = tables.HERE / name
     analysis, scenario = load_analysis(folder), load_scenario(folder / "scenario.yaml")
-    scenario = scenario.with_changes({"engine": "!Compiled"})
+    scenario = scenario.on_engine("compiled")
     best = analysis.best_gaits
     assert len(best) == scenario.evolution.trials
     for trial, sensitivity in best["sensitivity_in"].items():
