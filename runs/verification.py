@@ -203,7 +203,7 @@ def save_film(name: str) -> None:
     problem = PROBLEMS[name]
     scenario = scenario_of(problem, {}).with_changes({"engine": ENGINES["compiled"]["fine"]})
     result = simulate(scenario, seeded_gait(scenario), record=True)
-    film = {"size": (240, 180), "fps": 12.0, "view": "side", "speed": problem["film"]}
+    film = {"size": (240, 180), "fps": 6.0, "view": "side", "speed": problem["film"]}
     result.save_video(HERE / f"{name}.gif", **film)
 
 
