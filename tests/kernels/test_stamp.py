@@ -48,6 +48,13 @@ def function_of(text, value, comment="", doc="", field="a", other=0.0):
     return space["outer"]
 
 
+def in_module(module, source, **names):
+    """The value `outer` of a module's source."""
+    space = names | {"__name__": f"tetra_drake.{module}"}
+    exec(source, space)
+    return space["outer"]
+
+
 @pytest.mark.parametrize("text", USES.values(), ids=USES.keys())
 def test_a_digest_changes_with_what_is_used_and_with_nothing_else(text):
     first = stamp(function_of(text, 1.0))
@@ -57,11 +64,18 @@ def test_a_digest_changes_with_what_is_used_and_with_nothing_else(text):
 
 def test_values_that_are_exchanged_change_a_digest():
     def of(first, second):
-        space = {"a": first, "b": second, "__name__": "tetra_drake.of_a_test"}
-        exec("def outer(x): return a * x + b", space)
-        return stamp(space["outer"])
+        return stamp(in_module("of_a_test", "def outer(x): return a * x + b", a=first, b=second))
 
     assert of(1.0, 2.0) != of(2.0, 1.0)
+
+
+@pytest.mark.parametrize("source", ["def outer(x): return x", "outer = namedtuple('outer', 'a')"])
+def test_what_machine_code_imports_from_another_module_changes_a_digest(source):
+    def of(module):
+        used = in_module(module, source, namedtuple=namedtuple)
+        return stamp(in_module("user", "def outer(x): return used(x)", used=used))
+
+    assert of("one") == of("one") != of("another")
 
 
 def test_the_way_of_compilation_is_a_part():

@@ -59,7 +59,7 @@ def _text(value: Any) -> str | None:
         return f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, type):  # such as a NamedTuple
         fields = getattr(value, "_fields", ()), getattr(value, "_field_defaults", {})
-        return f"{value.__qualname__} {fields}"
+        return f"{value.__module__}.{value.__qualname__} {fields}"
     is_function = isinstance(getattr(value, "py_func", value), FunctionType)
     if is_function and value.__module__.partition(".")[0] not in _LIBRARIES:
         return None
