@@ -36,7 +36,7 @@ def write_force(parts, numbers):
 
 def force_of(law: FrictionLaw) -> np.ndarray:
     numbers, parts = np.array([0.1, -0.2, 0.0, 0.0]), Packed((law,))
-    machine_code(write_force, parts, numbers)(parts, numbers)
+    machine_code(write_force, parts, numbers)(numbers)
     return numbers[2:]
 
 

@@ -44,10 +44,10 @@ class Observer:
     def follow(self, robot: Robot) -> None:
         """Observes what an event has left of the robot, from now on."""
         signals = robot.structure.signals
-        self._parts = Packed((robot.model, self.tally, Forces.of(robot.model)))
+        parts = Packed((robot.model, self.tally, Forces.of(robot.model)))
         state, drives = robot.structure.initial_state, robot.starting_drives()
         one = np.zeros(1), state[np.newaxis], np.zeros((1, signals)), drives[np.newaxis]
-        self._observe = machine_code(observe_states, self._parts, *one)
+        self._observe = machine_code(observe_states, parts, *one)
 
     def add(
         self, times: np.ndarray, states: np.ndarray, signals: np.ndarray, drives: np.ndarray
@@ -55,7 +55,7 @@ class Observer:
         """Adds the k steps that end at `times` (k,) in s to the sums. At the ends, the bodies have
         `states` [q; v] (k, 13*bodies), the signals (k, m) are in N, and the actuators have the
         states `drives` (k, drives)."""
-        self._observe(self._parts, times, states, signals, drives)
+        self._observe(times, states, signals, drives)
 
 
 @compiled

@@ -110,17 +110,21 @@ def _for_kernels(function: F, options: Any) -> F:
     return function
 
 
-def machine_code(kernel: F, *arguments: object) -> F:
-    """Machine code of a kernel for arguments of the same types as `arguments`: a function that
-    Python calls like the kernel. If compilation is switched off, the kernel itself.
+def machine_code(
+    kernel: Callable[..., Any], parts: object, *arguments: object
+) -> Callable[..., Any]:
+    """Machine code of a kernel whose first argument is always `parts`, as a function of its other
+    arguments, of the same types as `arguments`. If compilation is switched off, it calls the
+    kernel.
 
     A call does not check types: with other types it fails or computes nonsense. Raises InputError
     with the place if a function cannot be compiled, as one of a plug-in may be.
     """
     if not hasattr(kernel, "compile"):  # compilation is switched off
-        return kernel
+        return functools.partial(kernel, parts)
     try:
-        return cast(F, kernel.compile(tuple(numba.typeof(argument) for argument in arguments)))
+        code = kernel.compile(tuple(numba.typeof(argument) for argument in (parts, *arguments)))
+        return functools.partial(code, parts)
     except NumbaError as error:
         # Of numba's nested errors, the innermost tells the cause. Its place comes first.
         cause = [str(error), *re.findall(r"frontend\)\n\s*(.+)", str(error))][-1]

@@ -8,7 +8,6 @@ generalized force; otherwise BodyStates_ and BodyForces_ translate.
 from __future__ import annotations
 
 import contextlib
-import functools
 import math
 import numbers
 import weakref
@@ -41,8 +40,6 @@ from pydrake.systems.primitives import Adder
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from tetra_drake.errors import InputError, check_type
-from tetra_drake.kernels.compiling import machine_code
-from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.model import WORLD
 
 SystemT = TypeVar("SystemT", bound=LeafSystem)
@@ -68,12 +65,6 @@ def DeclareOutput(
         lambda context, output: output.SetFromVector(np.ravel(read(this, context))),
         sources,
     )
-
-
-def bound(kernel: Callable[..., Any], parts: Packed[Any], *more: object) -> Callable[..., Any]:
-    """Machine code of a kernel as a function without its first argument, which is always `parts`.
-    `more` are examples of the other arguments; see machine_code()."""
-    return functools.partial(machine_code(kernel, parts, *more), parts)
 
 
 class Nodes(NamedTuple):

@@ -18,6 +18,7 @@ from pydrake.systems.framework import BasicVector, Context, DiagramBuilder
 from pydrake.systems.primitives import Integrator
 
 from tetra_drake.errors import InputError, SimulationFailure, check_type
+from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import actuator, cable, kinematics
 from tetra_drake.laws.actuator import Actuation, ActuatorKind, DrivenCables, Force
@@ -28,7 +29,6 @@ from tetra_drake.systems.attachment import (
     Attach,
     DeclareOutput,
     Nodes,
-    bound,
     check_constants,
     check_frame,
     check_host,
@@ -101,7 +101,7 @@ class CableNetwork(ConvertibleSystem):
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
         parts, state = Packed((model, self._forces)), np.empty(13 * bodies)
         self._no_signals, self._ends = np.zeros(signals), model.cables.pieces
-        self._compute_forces = bound(
+        self._compute_forces = machine_code(
             compute_cable_forces, parts, state, self._no_signals, self._force
         )
         self._state = self.DeclareVectorInputPort("state", state.size)

@@ -6,12 +6,12 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context
 
+from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.feedback import compute_feedback
 from tetra_drake.laws.forces import Forces
 from tetra_drake.robot.robot import Robot
-from tetra_drake.systems.attachment import bound
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
@@ -53,7 +53,7 @@ class Feedback(ConvertibleSystem):
         self.DeclareVectorOutputPort("feedback", 2 * signals, self._calc_feedback, tickets)
         state, modes = np.empty(sizes["state"]), np.empty((0, MODE_COLUMNS))
         given = state, modes, np.empty(signals), self._no_drives, np.empty(2 * signals)
-        self._compute = bound(compute_feedback, parts, *given)
+        self._compute = machine_code(compute_feedback, parts, *given)
 
     def _calc_feedback(self, context: Context, output: BasicVector) -> None:
         given = {name: port.Eval(context) for name, port in self._ports.items()}

@@ -20,6 +20,7 @@ from pydrake.systems.framework import (
 )
 
 from tetra_drake.errors import InputError, check_type, checked_numbers
+from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import contact
 from tetra_drake.laws.forces import Forces, compute_ground_forces
@@ -30,7 +31,6 @@ from tetra_drake.systems.attachment import (
     Attach,
     DeclareOutput,
     Nodes,
-    bound,
     check_constants,
     check_frame,
     check_host,
@@ -98,9 +98,9 @@ class GroundContact(ConvertibleSystem):
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
         parts = Packed((model, self._forces))
         state, table = np.empty(13 * bodies), np.empty((count, contact.MODE_COLUMNS))
-        self._compute_forces = bound(compute_ground_forces, parts, state, table, self._force)
-        self._update_modes = bound(modes_after_step, parts, state, table)
-        self._next_change = bound(next_mode_change, parts, state, self._force, table, 0.0)
+        self._compute_forces = machine_code(compute_ground_forces, parts, state, table, self._force)
+        self._update_modes = machine_code(modes_after_step, parts, state, table)
+        self._next_change = machine_code(next_mode_change, parts, state, self._force, table, 0.0)
         self._state = self.DeclareVectorInputPort("state", state.size)
         if modes is None:
             self.DeclareDiscreteState(table.size)

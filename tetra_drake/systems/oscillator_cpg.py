@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, ContinuousState
 
+from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.oscillator import Oscillators, make_states, state_rates, state_signals
-from tetra_drake.systems.attachment import bound
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
@@ -41,8 +41,10 @@ class OscillatorCpg(ConvertibleSystem):
         self._gain, inputs = float(gain), self._default_tonic.size
         # The kernel writes to these arrays at every call.
         parts, self._rates = Packed((oscillators, make_states(oscillators))), state.copy()
-        self._compute_rates = bound(state_rates, parts, state, self._default_tonic, self._rates)
-        self._compute_signals = bound(
+        self._compute_rates = machine_code(
+            state_rates, parts, state, self._default_tonic, self._rates
+        )
+        self._compute_signals = machine_code(
             state_signals, parts, state, self._gain, np.empty(inputs // 2)
         )
         self._tonic = self.DeclareVectorInputPort("tonic", inputs)

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
+from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces, compute_state_forces, compute_strut_forces
 from tetra_drake.robot.robot import Robot
-from tetra_drake.systems.attachment import bound
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
@@ -31,8 +31,8 @@ class StateForces(ConvertibleSystem):
         bodies = len(robot.structure.bodies)
         parts = Packed((robot.model, Forces.of(robot.model)))
         state, self._force = np.empty(13 * bodies), np.empty(6 * bodies)
-        self._compute = bound(compute_state_forces, parts, state, self._force)
-        self._touch = bound(compute_strut_forces, parts, state, 0.0, self._force)
+        self._compute = machine_code(compute_state_forces, parts, state, self._force)
+        self._touch = machine_code(compute_strut_forces, parts, state, 0.0, self._force)
         self._state = self.DeclareVectorInputPort("state", state.size)
         sources = {self._state.ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)

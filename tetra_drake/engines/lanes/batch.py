@@ -436,8 +436,7 @@ class LaneThread:
             places._replace(queue=self._queue, waiting=self._waiting),
             readings,
         )
-        self._parts = Packed(parts)
-        self._advance = machine_code(advance, self._parts, 0)
+        self._advance = machine_code(advance, Packed(parts), 0)
         self._rounds = max(1, _BODY_STEPS // (ROUND * len(first.driven.robot.structure.bodies)))
 
     @property
@@ -465,7 +464,7 @@ class LaneThread:
         """
         while robots := [*self._lane_places[self._status == loop.RUNNING], *self.waiting]:
             started = time.perf_counter()
-            self._advance(self._parts, self._rounds)
+            self._advance(self._rounds)
             wall_times[robots] += (time.perf_counter() - started) / len(robots)
             if briefly:
                 return

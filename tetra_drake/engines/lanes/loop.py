@@ -192,14 +192,14 @@ def iterate(constants: Constants, lanes: LaneState, log: Log) -> bool:
     for i in range(drives.shape[0]):  # predicted, for the forces at the end of the step
         drives[i, actuator.RATE] = at_end[i, actuator.RATE]
         at_end[i, actuator.DRIVE] = drives[i, actuator.DRIVE] + step * drives[i, actuator.RATE]
-    solver, live = constants.solver, constants.is_live
-    error = take_step(robot, solver, lanes.step, lanes.modes, forces, step, live)
+    solver, is_live = constants.solver, constants.is_live
+    error = take_step(robot, solver, lanes.step, lanes.modes, forces, step, is_live)
     for i in range(drives.shape[0]):  # corrected, with the mean of the rates at both ends
         rate = 0.5 * (drives[i, actuator.RATE] + at_end[i, actuator.RATE])
         lanes.end_drives[i] = drives[i, actuator.DRIVE] + step * rate
 
     accepted = is_running & (error <= constants.tolerance[0])
-    if constants.is_live:
+    if is_live:
         feel(constants, lanes, log, step_end, lanes.step.end)
         network, states = constants.oscillators, lanes.oscillators
         oscillator.correct_states(network, lanes.inputs, step, accepted, states)
