@@ -573,10 +573,8 @@ class StructureFile(RobotSettings):
                 refuse(f"pinned[{place}]", f"found '{node}', {expected}")
             for of_body in [*here.values()][1:]:
                 copy = unused_name(node, self.nodes | self.joints)
-                self.nodes[copy], self.joints[copy] = (
-                    self.nodes[node],
-                    BallJoint(nodes=[node, copy]),
-                )
+                self.nodes[copy] = self.nodes[node]
+                self.joints[copy] = BallJoint(nodes=[node, copy])
                 for nodes in of_body:
                     nodes[:] = [copy if one == node else one for one in nodes]
 

@@ -87,10 +87,17 @@ class _MjcfPart(NamedTuple):
     settings: Tree
 
 
-_Push = tuple[int, str, np.ndarray, str, tuple[float, float]]
-"""Force that an actuator exerts on a node from the world at control 0: number of the actuator;
-node; constant force (3,) in the world; axis of its spring and its damper, such as x; stiffness and
-damping."""
+class _Push(NamedTuple):
+    """Force that an actuator exerts on a node from the world at control 0."""
+
+    actuator: int
+    node: str
+    load: np.ndarray
+    """Constant force (3,) in the world."""
+    axis: str
+    """Axis of its spring and its damper, such as x."""
+    law: tuple[float, float]
+    """Stiffness and damping."""
 
 
 class _MjcfTranslation:
@@ -415,8 +422,8 @@ class _MjcfTranslation:
             root, name = int(self.roots[body]), self._name("body", body)
             loads[self._node(root, self.data.xipos[body], name)] += lifts[body] * gravity
         pushes = [*self._pushes(used)]
-        laws = [law for *_, law in pushes if any(law)]
-        axes = {(node, axis) for _, node, _, axis, law in pushes if any(law)}
+        laws = [push.law for push in pushes if any(push.law)]
+        axes = {(push.node, push.axis) for push in pushes if any(push.law)}
         are_alike = len({*laws}) == 1 and laws[0][0] > 0.0 and len(axes) == len(laws)
         for actuator, node, load, axis, (stiffness, damping) in pushes:
             if (stiffness or damping) and (anchors or not are_alike):
@@ -448,7 +455,7 @@ class _MjcfTranslation:
                 load = push + law[0] * (0.0 if is_closed else gap)
                 stiffness, damping = (-(axis @ axis) * np.array(law)).tolist()
                 along = "xyz"[int(np.abs(axis).argmax())]
-                yield actuator, self.node_of[site], axis * load, along, (stiffness, damping)
+                yield _Push(actuator, self.node_of[site], axis * load, along, (stiffness, damping))
 
     def _close(self, joints: Tree) -> None:
         """Moves the second node of each joint with a small gap to the first."""
