@@ -12,7 +12,7 @@ import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +78,16 @@ SPEED = "relative_speed"
 DRAWN = ("5 %", "95 %")
 """Quantiles of a gait's distances in draws of disturbances that pages show."""
 
+_FOUND = ("trial", "evaluation", "evaluations", "fitness")
+_MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
+_COLUMNS = {
+    "best_gaits": [*_FOUND, *SHOWN, SPEED, "sensitivity_in", TURNED],
+    "resimulations": ["trial", "setting", "distance_in", TURNED],
+    "unseen": ["trial", "seed", "distance_in", "met"],
+    "disturbed": ["gait", "undisturbed", *DRAWN, *_MEAN, *_KEPT, "failed", "missed"],
+}
+"""Columns of the tables of an Analysis in the record, which must have them, but for TURNED."""
+
 
 @dataclass(frozen=True)
 class Analysis:
@@ -130,8 +140,12 @@ def analysis_of(content: Mapping[str, Any]) -> Analysis:
     """Analysis of the content of analysis.json."""
     if content["schema"] != SCHEMA:
         raise ValueError(f"schema {content['schema']}, expected {SCHEMA}")
-    names = [field.name for field in fields(Analysis)]
-    tables = (pandas.DataFrame(content[name]).fillna(math.nan) for name in names)  # for null
+    tables = []
+    for name, columns in _COLUMNS.items():
+        given = ({TURNED: None} | row for row in content[name])
+        rows = [[row[column] for column in columns] for row in given]
+        table = pandas.DataFrame(rows, columns=columns)
+        tables.append(table.fillna(math.nan).infer_objects())  # for null
     best, again, unseen, disturbed = tables
     return Analysis(best.set_index("trial"), again, unseen, disturbed.set_index("gait"))
 

@@ -212,10 +212,12 @@ def due(walks: Sequence[Row], places: np.ndarray, before: np.ndarray) -> dict[st
     for cable in ["", *scenario().whole_cables]:
         own = [row for row in walks if row["cable"] == cable]
         tried, speeds = [row["gait"] for row in own], [row["speed"] / unit for row in own]
-        if not cable:
-            gaits[cable] = [0, int(np.argmax(before)), None][len(own)]
-        else:
-            gaits[cable] = next_trial(places, before, tried, speeds) if own else 0
+        if not own:
+            gaits[cable] = 0
+        elif cable:
+            gaits[cable] = next_trial(places, before, tried, speeds)
+        elif len(own) == 1:
+            gaits[cable] = int(np.argmax(before))
     return {cable: gait for cable, gait in gaits.items() if gait is not None}
 
 
