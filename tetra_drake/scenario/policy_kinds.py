@@ -31,7 +31,7 @@ Reading = Literal[
 class RollingPolicy(PolicyKind):
     """Policy that rolls a robot: each cable is shortened by the same polynomial of x and z.
 
-    They are the place of its middle from the robot's centre, in the world frame, in units of half
+    x and z are of the cable's middle from the robot's centre, in the world frame, in units of half
     the first strut. So the robot keeps its shape in the world while it rolls through it; a clock
     keeps it from coming to rest. The parameters are the coefficients of 1, x, z, x², xz, z², sx and
     sz, where s is the sine of the clock.
