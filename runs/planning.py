@@ -307,5 +307,6 @@ def main(groups: Sequence[str], folder: Path = HERE) -> None:
     run_all([each for each in episodes if each.group in groups], folder)
     if not (folder / FILM).exists():
         (slalom,) = (each for each in episodes if each.name == "slalom")
-        film(run_episode(slalom)[1], slalom.pillars, folder / FILM)
+        record, result = run_episode(slalom)
+        film(result, record, folder / FILM)
     write_page(folder, episodes)

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from page import rendered
-from PIL import Image
 from record import load_times
 from records import read
 from script import read_settings
@@ -29,10 +30,8 @@ GIVEN: dict[str, Any] = read_settings(HERE / "episodes.yaml")
 """What is run, see the file."""
 GROUPS = [*dict.fromkeys(row["group"] for row in GIVEN["episodes"])]
 """Groups of episodes, in the order of the runs."""
-FRAME, COLOURS = 0.2, 12
-"""Time between the film's pictures in s, and number of their colours."""
-VIEW, TALL = math.radians(40.0), 0.6
-"""Angle (rad) from the horizontal at which the film looks down, and height (m) of its pillars."""
+FRAME = 0.3
+"""Time (s) between the film's pictures."""
 
 Record = dict[str, Any]
 """Record of an episode; see planning.recorded()."""
@@ -52,50 +51,28 @@ def centre_of(p_WN: np.ndarray) -> np.ndarray:
 # The film
 
 
-def film(result: SimulationResult, pillars: Sequence[Sequence[float]], file: Path) -> None:
-    """Writes a GIF of a robot among pillars, seen obliquely, at twice its speed."""
-    structure, trajectory = result.robot.structure, result.trajectory
-    times, nodes = trajectory.time.values, trajectory.p_WN.values
-    path = _seen(np.pad(centre_of(nodes), ((0, 0), (0, 1))))
-    figure = Figure(figsize=(5.6, 2.1))
-    canvas, pictures = FigureCanvasAgg(figure), []
-    ends = structure.segments.ends
-    for sample in np.searchsorted(times, np.arange(0.0, result.duration, FRAME)):
-        figure.clear()
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        axes.plot(*path[: sample + 1].T, color="C0", linewidth=0.8)
-        seen = _seen(nodes[sample])
-        behind = centre_of(nodes[sample])[1]
-        for x, y in pillars:
-            draw_pillar(axes, x, y, zorder=1 if y > behind else 4)
-        axes.plot(*seen[ends].transpose(2, 1, 0), color="0.6", linewidth=0.6, zorder=2)
-        struts = seen[structure.struts].transpose(2, 1, 0)
-        axes.plot(*struts, color="black", linewidth=1.8, zorder=3)
-        axes.set(xlim=(-0.5, 6.5), ylim=(-1.2, 1.42), aspect="equal")
-        axes.set_axis_off()
-        canvas.draw()
-        picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-        pictures.append(picture.quantize(COLOURS))
-    pace = round(500.0 * FRAME)
-    pictures[0].save(file, save_all=True, append_images=pictures[1:], duration=pace, loop=0)
+def film(result: SimulationResult, record: Record, file: Path) -> None:
+    """Writes a GIF of a robot on its way among pillars, seen from above, at twice its speed."""
+    nodes, structure = result.trajectory.p_WN.values[..., :2], result.robot.structure
+    instants = np.arange(0.0, result.duration, FRAME)
+    samples = np.searchsorted(result.trajectory.time.values, instants)
+    figure = Figure(figsize=(7.0, 2.5), dpi=70)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    draw_way(axes, record)
+    cables = LineCollection([], color="0.6", linewidth=0.6)
+    struts = LineCollection([], color="black", linewidth=1.8)
+    axes.add_collection(cables)
+    axes.add_collection(struts)
+    axes.set(xlim=(-0.5, 6.5), ylim=(-1.4, 1.1), aspect="equal")
+    axes.set_axis_off()
 
+    def draw(sample: int) -> list[Artist]:
+        cables.set_segments(nodes[sample][structure.segments.ends])
+        struts.set_segments(nodes[sample][structure.struts])
+        return [cables, struts]
 
-def _seen(points: np.ndarray) -> np.ndarray:
-    """Places (..., 2) in a picture of points (..., 3) seen obliquely from above."""
-    across = math.sin(VIEW) * points[..., 1] + math.cos(VIEW) * points[..., 2]
-    return np.stack([points[..., 0], across], axis=-1)
-
-
-def draw_pillar(axes: Axes, x: float, y: float, *, zorder: float) -> None:
-    """Draws a pillar at a place, seen obliquely."""
-    around = np.linspace(0.0, math.tau, 40)
-    ring = np.stack(
-        [x + GIVEN["pillar"] * np.cos(around), y + GIVEN["pillar"] * np.sin(around)], axis=-1
-    )
-    low, high = (_seen(np.pad(ring, ((0, 0), (0, 1)), constant_values=z)) for z in (0.0, TALL))
-    outline = np.vstack([low[20:], high[:21]])
-    axes.fill(*outline.T, color="C1", zorder=zorder)
-    axes.fill(*high.T, color="C1", edgecolor="white", zorder=zorder + 0.1)
+    motion = FuncAnimation(figure, draw, samples)
+    motion.save(str(file), PillowWriter(fps=round(2.0 / FRAME)))
 
 
 # The page
