@@ -307,18 +307,14 @@ def speed_figure(shares: pandas.DataFrame, plans: pandas.DataFrame) -> Figure:
     looks["found"] = ("after trials", found, 0.15)
     by_cable, by_trial = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     names = [*reversed(dict.fromkeys(shares["group"]))]
-    for height, name in enumerate(names):
-        own = shares[shares["group"] == name]
-        for column, (_, color, shift) in looks.items():
-            low, middle, high = own[column].quantile([0.0, 0.5, 1.0])
-            by_cable.hlines(height + shift, low, high, color=color, linewidth=1.5)
-            by_cable.plot(middle, height + shift, "o", color=color, markersize=4.0)
-        for share in plans[plans["group"] == name]["share"]:
-            by_cable.plot(share, height, **_PLANNER)
-    by_cable.set_yticks(range(len(names)), names, fontsize="small")
-    for label, color, _ in looks.values():
-        by_cable.plot([], [], "o-", color=color, markersize=4.0, label=label)
-    by_cable.plot([], [], **_PLANNER, label="planner")
+    heights = pandas.Series(range(len(names)), index=names, dtype=float)
+    for column, (label, color, shift) in looks.items():
+        own = shares.groupby("group")[column].agg(["median", "min", "max"]).loc[names]
+        ends = own["median"] - own["min"], own["max"] - own["median"]
+        points: Any = {"fmt": "o", "color": color, "markersize": 4.0, "label": label}
+        by_cable.errorbar(own["median"], heights + shift, xerr=[*ends], **points)
+    by_cable.plot(plans["share"], plans["group"].map(heights), label="planner", **_PLANNER)
+    by_cable.set_yticks(heights, names, fontsize="small")
     by_cable.legend(frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.4, 1.0))
     by_cable.set(xlabel="speed / speed before the damage")
     by_cable.margins(x=0.03)
