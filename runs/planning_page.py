@@ -148,6 +148,6 @@ def write_page(folder: Path, episodes: Sequence[Any]) -> None:
         goals=goals,
         costs=costs,
         found=partial(speeds, groups["speeds"]),
-        evolved=load_times(HERE.parent)["rolling"]["evolution"]["cores_s"],
+        evolved=load_times(HERE.parent)["rolling"]["cores_s"],
     )
     write_whole(folder / "README.md", text)

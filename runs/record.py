@@ -5,7 +5,7 @@
 Each experiment is evolved and analysed in a folder of out/runs, then thinned into a folder here. A
 picture (made by Chromium from a replay) and a gait diagram show its best gait. Experiments in
 README.md are filmed, too. After an interruption the script continues; finished experiments are
-skipped. times.json has the time of each experiment.
+skipped. times.json has the time of each evolution.
 
 With --so-far, the folders here get what there is of experiments that are being evolved. Such a run
 is whole, not thinned: where out/runs has none, the script goes on from it.
@@ -51,7 +51,7 @@ PICTURE, FILM = "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
 TIMES = "times.json"
-SO_FAR, EVOLUTION = "--so-far", "evolution"
+SO_FAR = "--so-far"
 
 
 @dataclass(frozen=True)
@@ -105,9 +105,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
         return
     if not (made / MANIFEST).exists() and is_unfinished(shown, scenario):
         thin(shown, made, whole=True)
-    if not (made / MANIFEST).exists():
-        save_times(load_times(out) | {name: {}}, out)
-    with timed(name, EVOLUTION, out):
+    with timed(name, out, anew=not (made / MANIFEST).exists()):
         # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
         evolved(scenario, made)
     publish(name, experiment, made, out=out)
@@ -116,10 +114,8 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
 def record_so_far(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> None:
     """Puts what there is of a run in `scratch`, which another process may evolve, into `out`."""
     with tempfile.TemporaryDirectory() as folder:
-        copy, times = Path(folder) / name, load_times(out)
+        copy = Path(folder) / name
         thin(scratch / name, copy, whole=True)
-        evolution = {key: time for key, time in times.get(name, {}).items() if key == EVOLUTION}
-        save_times(times | {name: evolution}, out)
         publish(name, experiment, copy, out=out, whole=True)
 
 
@@ -138,43 +134,35 @@ def publish(
     unless it is to be `whole`."""
     analysis, shown = made / ANALYSIS, out / name
     if not analysis.exists():
-        with timed(name, "analysis", out):
-            judge_elites(made)
-            analyse(made, workers=available_cores())
-    with timed(name, "pages", out):
-        for old in shown.glob("trial_*"):
-            shutil.rmtree(old)
-        thin(made, shown, initial=experiment.initial, whole=whole)
-        show(shown, film=experiment.film)
+        judge_elites(made)
+        analyse(made, workers=available_cores())
+    for old in shown.glob("trial_*"):
+        shutil.rmtree(old)
+    thin(made, shown, initial=experiment.initial, whole=whole)
+    show(shown, film=experiment.film)
     shutil.copy(analysis, shown / ANALYSIS)
 
 
 def load_times(out: Path) -> dict[str, Any]:
-    """Times of the experiments recorded in the folder `out`: wall_s and cores_s (s) by name and
-    stage."""
+    """Times of the evolutions recorded in the folder `out`: wall_s and cores_s (s) by name."""
     file = out / TIMES
     return read_json(file, "times") if file.exists() else {}
 
 
-def save_times(times: Mapping[str, Any], out: Path) -> None:
-    """Writes the times of the experiments recorded in the folder `out`."""
-    write_whole(out / TIMES, json.dumps(times, indent=1) + "\n")
-
-
 @contextlib.contextmanager
-def timed(name: str, stage: str, out: Path) -> Iterator[None]:
-    """Context manager that adds the times of the block to the times in `out`: wall time, and the
-    time of all cores. Also after an interruption."""
+def timed(name: str, out: Path, *, anew: bool) -> Iterator[None]:
+    """Context manager that adds the times of an evolution, or of one `anew`, to the times in `out`:
+    wall time, and the time of all cores. Also after an interruption."""
+    before = {} if anew else load_times(out).get(name, {})
     begin, work = time.monotonic(), sum(os.times()[:4])
     try:
         yield
     finally:
-        times = load_times(out)
-        spent = times.setdefault(name, {}).setdefault(stage, {"wall_s": 0.0, "cores_s": 0.0})
-        spent["wall_s"] = round(spent["wall_s"] + time.monotonic() - begin, 1)
-        spent["cores_s"] = round(spent["cores_s"] + sum(os.times()[:4]) - work, 1)
-        save_times(times, out)
-        print(f"{name}, {stage}: {duration(spent['wall_s'])}", flush=True)
+        spent = {"wall_s": time.monotonic() - begin, "cores_s": sum(os.times()[:4]) - work}
+        total = {key: round(before.get(key, 0.0) + spent[key], 1) for key in spent}
+        text = json.dumps(load_times(out) | {name: total}, indent=1)
+        write_whole(out / TIMES, text + "\n")
+        print(f"{name}: {duration(total['wall_s'])}", flush=True)
 
 
 def best_walk(directory: Path) -> SimulationResult:

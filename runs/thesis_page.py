@@ -103,7 +103,7 @@ def trials_numbers(run: Run) -> dict[str, Any]:
     best, scenario = run.best().set_index("trial"), run.scenario
     trial, robot = int(best["fitness"].idxmax()), Robot.of(scenario)
     iterations = run.iterations.groupby("trial")["iteration"].max()
-    wall_time = load_times(HERE)[run.directory.name]["evolution"]["wall_s"]
+    wall_time = load_times(HERE)[run.directory.name]["wall_s"]
     seconds = wall_time / iterations.sum()
     signals = [steady_signals(robot, gait)[:, 0] for gait in run.gaits()]
     times = steady_times(scenario)
