@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-import pandas
 from matplotlib.figure import Figure
 from PIL import Image
 from readings import THESIS
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run
-from tetra_drake.figures.fitness import initial_fitness
+from tetra_drake.figures.fitness import fitness_of_trials, initial_fitness
 from tetra_drake.figures.forces import ground_forces, signals_and_tensions
 from tetra_drake.figures.motion import one_step, relative_distances, time_lapse
 from tetra_drake.figures.style import (
@@ -23,7 +22,6 @@ from tetra_drake.figures.style import (
     REFERENCE,
     common_style,
     legend_below,
-    line_style,
     make_figure,
 )
 from tetra_drake.files import write_whole
@@ -34,17 +32,12 @@ from tetra_drake.settings.units import INCH
 
 Results: TypeAlias = dict[str, list[SimulationResult]]
 """Simulated gaits of the trials, by GAITS."""
-BEST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
-WORST: Any = {"color": OKABE_ITO["orange"], "linestyle": "-"}
 GAITS: Any = {
-    "best initial": BEST,
-    "worst initial": WORST,
+    "best initial": {"color": OKABE_ITO["blue"], "linestyle": "-"},
+    "worst initial": {"color": OKABE_ITO["orange"], "linestyle": "-"},
     "best evolved": {"color": OKABE_ITO["green"], "linestyle": "-"},
 }
 """Looks of the gaits of each trial, by name."""
-MEAN: Any = {"color": "black", "linestyle": ":"}
-BARS = 100
-"""Number of iterations between two bars of the standard deviation."""
 TURN = -0.09
 """Angle (rad) by which Figure 13 turns the robot."""
 COLOURS = 40
@@ -64,11 +57,6 @@ def walks(run: Run) -> Results:
         gaits = [run.gait(row["trial"], row["index"]) for _, row in rows.iterrows()]
         results[name] = [simulate(run.scenario, gait, record=True) for gait in gaits]
     return results
-
-
-def mean_fitness(run: Run) -> pandas.DataFrame:
-    """Mean fitness of the populations: iterations in rows, trials in columns."""
-    return run.iterations.pivot(index="iteration", columns="trial", values="mean_fitness")
 
 
 @common_style()
@@ -123,35 +111,6 @@ def forward_distances(
 
 
 @common_style()
-def fitness_of_all_trials(run: Run) -> Figure:
-    """Mean fitness of each trial over its iterations (Figure 22)."""
-    figure, axes = make_figure(width_in=7.0, height_in=3.8)
-    table = mean_fitness(run)
-    for series, trial in enumerate(table.ffill().iloc[-1].sort_values(ascending=False).index):
-        axes[0, 0].plot(table.index, table[trial], label=f"trial {trial}", **line_style(series))
-    axes[0, 0].set(xlabel="iteration", ylabel="mean fitness of the population (in)")
-    figure.legend(loc="outside right center", frameon=False)
-    return figure
-
-
-@common_style()
-def fitness_of_best_and_worst(run: Run) -> Figure:
-    """Mean fitness of the best and the worst trial, and the average of all with bars of the
-    standard deviation (Figure 23). A trial that has ended keeps its last value."""
-    figure, axes = make_figure(width_in=7.0, height_in=3.8)
-    panel, table = axes[0, 0], mean_fitness(run).ffill()
-    ends, mean, spread = table.iloc[-1], table.mean(axis=1), table.std(axis=1)
-    panel.plot(table.index, table[ends.idxmax()], **BEST)
-    panel.plot(table.index, table[ends.idxmin()], **WORST)
-    bars: Any = {"errorevery": BARS, "capsize": 2.0, "elinewidth": 0.7, "ecolor": "0.4"}
-    panel.errorbar(table.index, mean, yerr=spread, **MEAN, **bars)
-    panel.set(xlabel="iteration", ylabel="mean fitness of the population (in)")
-    names = {f"best trial, {ends.idxmax()}": BEST, f"worst trial, {ends.idxmin()}": WORST}
-    legend_below(figure, names | {"average of all trials": MEAN})
-    return figure
-
-
-@common_style()
 def save_figures(run: Run, out: Path) -> None:
     """Writes the figures into a folder, named by their numbers in the thesis."""
     results, trial = walks(run), int(run.fittest()["trial"])
@@ -168,8 +127,7 @@ def save_figures(run: Run, out: Path) -> None:
         19: signals_and_tensions(best, title=False),
         20: ground_forces(best, title=False),
         21: one_step(best, title=False, instants=4),
-        22: fitness_of_all_trials(run),
-        23: fitness_of_best_and_worst(run),
+        22: fitness_of_trials(run, title=False),
     }
     for number, figure in figures.items():
         picture, file = io.BytesIO(), io.BytesIO()
