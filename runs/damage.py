@@ -97,15 +97,12 @@ def steered(gait: Gait, turn: float) -> Gait:
 
 def fastest_of_cells() -> list[Gait]:
     """The fastest gait of each cell of the map, among all that were evaluated for it."""
-    run, fastest = load_run(MAP), dict[tuple[int, ...], Gait]()
+    run = load_run(MAP)
     rows = run.evaluations[run.evaluations["relative_speed"] >= SET["slowest"]]
-    shares = rows.filter(like="lifted_T")
-    for number in rows["relative_speed"].to_numpy().argsort()[::-1].tolist():
-        cell = tuple((SET["cells"] * shares.iloc[number]).astype(int))
-        if cell not in fastest:
-            key = rows.iloc[number][["trial", "index"]].astype(int)
-            fastest[cell] = run.gait(*key)
-    return [*fastest.values()]
+    cells = (SET["cells"] * rows.filter(like="lifted_T")).astype(int)
+    fastest = rows.sort_values("relative_speed", ascending=False)
+    first = fastest[~cells.loc[fastest.index].duplicated()]
+    return [run.gait(*key) for key in first[["trial", "index"]].astype(int).to_numpy().tolist()]
 
 
 def find_gaits() -> None:

@@ -2,9 +2,8 @@
 
     manifest.json, scenario.yaml    unchanged, but the first has `thinned`
     trial_00/best_gait.json, trial_00/best.yaml    unchanged
-    trial_00/evaluations.jsonl.xz      genomes of the kept gaits, all digits of the metrics that
-                                       select gaits, and six of the others; for other gaits few
-                                       digits of the former
+    trial_00/evaluations.jsonl.xz      unchanged for kept gaits; of others few digits of the
+                                       metrics that select gaits, without genomes
     trial_00/iterations.jsonl.xz, trial_00/reevaluations.jsonl.xz (without genomes), elites.jsonl.xz
 
 Kept gaits are: the best of each trial, gaits evaluated again on the diagram, gaits of a map, and of
@@ -42,9 +41,8 @@ from tetra_drake.lab.elites.elites import elites
 from tetra_drake.scenario.load import SCENARIO
 from tetra_drake.scenario.scenario import Scenario
 
-_DIGITS, _KEPT_DIGITS, _WALL_TIME_DIGITS = 3, 6, 2
-"""Significant digits of the numbers of an evaluation without genome, of a kept gait's metrics that
-select no gaits, and of all wall times."""
+_DIGITS, _WALL_TIME_DIGITS = 3, 2
+"""Significant digits of the numbers of an evaluation without genome, and of all wall times."""
 
 _DECIMALS = 9
 """Decimals of metrics in SI. Further digits are rounding errors, such as the drift of a symmetric
@@ -67,11 +65,13 @@ def thin(source: Path, out: Path, *, initial: bool = False, whole: bool = False)
         thinned = []
         for entry in _entries(run, EVALUATIONS, trial):
             key = trial, entry["index"]
-            reduced = _kept(entry, metrics) if key in matter else _thinned(entry, metrics)
-            reduced |= {"fitness": entry["fitness"]} if key in rises else {}
-            kept = entry if whole else reduced
-            wall_time = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
-            thinned.append(kept | {"wall_time_s": wall_time})
+            fitness, wall_time = entry["fitness"], entry["wall_time_s"]
+            if not whole and key not in matter:
+                entry = _thinned(entry, metrics)
+            if key in rises:
+                entry["fitness"] = fitness
+            entry["wall_time_s"] = _rounded(wall_time, _WALL_TIME_DIGITS)
+            thinned.append(entry)
         again = [e | {"genome": None} for e in _entries(run, REEVALUATIONS, trial)]
         _write(run, out, EVALUATIONS, thinned, trial=trial)
         _write(run, out, ITERATIONS, iterations, trial=trial)
@@ -115,15 +115,6 @@ def _that_choose(scenario: Scenario) -> set[str]:
     """Metrics that select gaits of a run: objective, requirements, and measures of a map."""
     measures = getattr(scenario.optimizer, "measures", ())
     return {"distance", *scenario.objective, *scenario.require, *measures}
-
-
-def _kept(entry: Mapping[str, Any], metrics: Container[str]) -> dict[str, Any]:
-    """Entry of a kept gait, with all digits of these metrics."""
-    rounded = {
-        name: value if name in metrics else _rounded(value, _KEPT_DIGITS)
-        for name, value in entry["metrics"].items()
-    }
-    return dict(entry) | {"metrics": rounded}
 
 
 def _thinned(entry: Mapping[str, Any], metrics: Container[str]) -> dict[str, Any]:
