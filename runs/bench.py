@@ -29,7 +29,7 @@ import pandas
 from matplotlib.figure import Figure
 from page import rendered
 from records import append, read
-from script import read_settings, script
+from script import draw_dots, read_settings, script
 
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate
@@ -309,13 +309,9 @@ def scores_figure(records: Sequence[Record]) -> Figure:
     figure = Figure(figsize=(8.0, 4.0), layout="constrained")
     axes = figure.subplots(2, math.ceil(len(TASKS) / 2), sharex=True, sharey=True)
     for axis, task in zip(axes.flat, TASKS, strict=False):
-        for place, name in enumerate(names):
-            values = of_entries[name].get(task.name, np.zeros(0))
-            axis.plot(values, np.full(values.shape, place), "o", color=f"C{place}", alpha=0.6, ms=4)
+        of_task = {name: of_entries[name].get(task.name, np.zeros(0)) for name in names}
+        draw_dots(axis, of_task, best=1.0)
         axis.set_title(task.name)
-        axis.axvline(1.0, color="0.7", linewidth=0.8)
-        axis.set_yticks(range(len(names)), names)
-    axes.flat[0].set_ylim(len(names) - 0.5, -0.5)
     figure.supxlabel("score as a share of the best interquartile mean")
     return figure
 

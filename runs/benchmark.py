@@ -279,10 +279,9 @@ def tried(
     diagram = MakeTensegrityDiagram(robot, gait, scene_graph=scheme == "cenic")
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, scheme, step)
-    setting = f"step {1e3 * step:.3g} ms"
-    if accuracy is not None:
+    setting = f"accuracy {accuracy:.2g}" if accuracy else f"step {1e3 * step:.3g} ms"
+    if accuracy:
         integrator.set_target_accuracy(accuracy)
-        setting = f"accuracy {accuracy:.2g}"
     started = time.process_time()
     try:
         simulator.AdvanceTo(robot.scenario.simulation.duration)

@@ -26,7 +26,7 @@ from matplotlib.figure import Figure
 from page import rendered
 from record import SCRATCH, load_experiments
 from records import append, read
-from script import evolved, measured, script
+from script import draw_dots, evolved, measured, script
 from sine import PERIOD, load_sines, peak, steady_signals
 
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -79,9 +79,8 @@ def wave(signals: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
 def share(signals: np.ndarray, lags: np.ndarray) -> float:
     """Share of the power of signals that is one wave with these lags and equal amplitudes."""
     shape = np.exp(1j * np.radians(np.cumsum([0.0, *lags])))
-    return float(
-        2.0 * abs(shape @ wave(signals)[2] / shape.size) ** 2 / np.mean(signals**2, 0).sum()
-    )
+    power = np.mean(signals**2, axis=0).sum()
+    return float(2.0 * abs(shape @ wave(signals)[2] / shape.size) ** 2 / power)
 
 
 def nearest(scenario: Scenario, lags: np.ndarray) -> Gait:
@@ -181,13 +180,9 @@ def trials_figure(found: dict[str, Any], line: float) -> Figure:
     """Distances of all trials by experiment; the line is the best sine."""
     figure = Figure(figsize=(8.0, 0.4 * len(found) + 1.0), layout="constrained")
     axes = figure.subplots()
-    for place, each in enumerate(found.values()):
-        axes.plot(each["trials"], np.full(each["trials"].shape, place), "o", alpha=0.6, ms=4)
-    axes.axvline(line, color="0.7", linewidth=0.8)
-    axes.set_yticks(range(len(found)), [EXPERIMENTS[name].title for name in found])
-    axes.set(
-        xlabel=f"distance in 15 s at a peak of {PEAK} N, inches", ylim=(len(found) - 0.5, -0.5)
-    )
+    trials = {EXPERIMENTS[name].title: each["trials"] for name, each in found.items()}
+    draw_dots(axes, trials, best=line)
+    axes.set(xlabel=f"distance in 15 s at a peak of {PEAK} N, inches")
     return figure
 
 

@@ -1,4 +1,4 @@
-"""What the scripts of this folder have in common: command line, settings, records, evolution."""
+"""What the scripts of this folder have in common: command line, settings, records, figures."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
+
+import numpy as np
+from matplotlib.axes import Axes
 
 from tetra_drake.engines.simulate import Outcome
 from tetra_drake.errors import InputError
@@ -80,6 +83,15 @@ def read_record(path: Path, use: Callable[[Any], T], command: str) -> T:
 def measured(walk: Outcome, metric: str) -> float:
     """A metric of a simulation, such as "distance_in"; NaN if it failed."""
     return getattr(walk.metrics, metric) if isinstance(walk, SimulationResult) else math.nan
+
+
+def draw_dots(axes: Axes, values: Mapping[str, np.ndarray], best: float) -> None:
+    """Draws values as dots in a row per name, from the top, and a line at the best one."""
+    for place, row in enumerate(values.values()):
+        axes.plot(row, np.full(row.shape, place), "o", color=f"C{place}", alpha=0.6, ms=4)
+    axes.axvline(best, color="0.7", linewidth=0.8)
+    axes.set_yticks(range(len(values)), [*values])
+    axes.set_ylim(len(values) - 0.5, -0.5)
 
 
 def evolved(scenario: Scenario, folder: Path, optimizer: MakeOptimizer | None = None) -> Run:
