@@ -9,8 +9,9 @@ kept with its parameters must go as far as recorded.
 
 Last digits do not count, as processors and versions round differently: parameters may differ by a
 millionth of their values, as rounding errors of CMA-ES grow from 1e-10 in 300 evaluations,
-distances by what a displacement by 1 nm changes (see analyse.ROUNDINGS). A thinned run keeps six
-digits of most fitnesses and three of metrics, so a search parts from it later.
+distances by three times what the ninth digit of gravity changes, see analyse.ROUNDINGS: in a motion
+with impacts errors grow to centimetres. A thinned run keeps six digits of most fitnesses and three
+of metrics, so a search parts from it later.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from analyse import ROUNDINGS, sensitivity
+from analyse import ROUNDINGS
 from parting import asked, made
 from record import EXPERIMENTS, HERE, Experiment
 from script import chosen, script
@@ -31,6 +32,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.formatting import fixed, listed
 from tetra_drake.machine import available_cores
+from tetra_drake.optimizers.base import Task
 from tetra_drake.settings.units import INCH
 
 EVALUATIONS, ON_DIAGRAM = 300, 60
@@ -38,6 +40,9 @@ EVALUATIONS, ON_DIAGRAM = 300, 60
 
 PARAMETERS = 1e-6
 """Largest relative difference of parameters that does not count."""
+
+ROUNDED, TIMES = 1e-9, 10
+"""Relative change of gravity that does not count, and number of its multiples that are tried."""
 
 DISTANCE = 1e-3
 """Difference of distances (in) that does not count for any gait. It is less than the difference of
@@ -67,28 +72,34 @@ def first_difference(run: Run) -> str:
     iterations = trial["iteration"].astype(int)
     evaluate = GaitEvaluation(run.scenario)
     with evaluator_of(evaluate, workers=available_cores(), warn=print) as evaluator:
-        tasks = [
-            run.manifest.task(run.vector(0, i), trial=0, index=i, iteration=iterations[i])
+        tasks = {
+            i: run.manifest.task(run.vector(0, i), trial=0, index=i, iteration=iterations[i])
             for i in kept
-        ]
-        found = {task.index: evaluation for task, evaluation in evaluate_all(evaluator, tasks)}
+        }
+        again = evaluate_all(evaluator, [*tasks.values()])
+        found = {task.index: evaluation for task, evaluation in again}
     for index in kept:
         before = trial.loc[index, "distance_in"]
         now = found[index].metrics.get("distance", math.nan) / INCH
-        if goes_elsewhere(run, index, before, now):
+        if goes_elsewhere(run, tasks[index], before, now):
             return f"evaluation {index} goes {fixed(now, 3)} in, not {fixed(before, 3)} in"
     if all(alike):
         return ""
     return f"search differs at evaluation {kept[alike.index(False)]} or earlier"
 
 
-def goes_elsewhere(run: Run, index: int, before: float, now: float) -> bool:
-    """True if the distance of a gait has changed by more than rounding errors explain."""
+def goes_elsewhere(run: Run, task: Task, before: float, now: float) -> bool:
+    """True if the distance (in) of an evaluation has changed by more than rounding errors
+    explain."""
     apart = abs(now - before)
     if apart <= DISTANCE or (math.isnan(before) and math.isnan(now)):
         return False
-    (change,) = sensitivity(run.scenario, [run.gait(0, index)], available_cores())
-    return not apart <= ROUNDINGS * change
+    changes = []
+    for times in range(1, TIMES + 1):
+        gravity = run.scenario.robot.gravity * (1.0 + times * ROUNDED)
+        evaluation = GaitEvaluation(run.scenario.with_numbers({"robot.gravity": gravity}))(task)
+        changes.append(abs(evaluation.metrics.get("distance", math.nan) / INCH - now))
+    return not apart <= ROUNDINGS * np.nanmax(changes)
 
 
 @script
