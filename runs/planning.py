@@ -97,8 +97,7 @@ class Way:
     passed: int = 0
 
     def __post_init__(self) -> None:
-        places = self.places if self.pillars else []
-        self.fields = [way_field(place, self.pillars) for place in places]
+        self.fields = [way_field(place, self.pillars) for place in self.places if self.pillars]
 
     def __call__(self, readings: Readings) -> np.ndarray:
         ends = centre_of(readings.p_WN[-1])

@@ -134,9 +134,8 @@ def costs(records: Sequence[Record], key: str, limit: float) -> dict[str, float]
 def write_page(folder: Path, episodes: Sequence[Any]) -> None:
     """Writes the page of the records in a folder, and its pictures. `episodes` are all there are,
     see planning.Episode."""
-    groups: dict[str, list[Record]] = {group: [] for group in GROUPS}
-    for (group, _), record in load_records(folder).items():
-        groups[group].append(record)
+    known = load_records(folder).items()
+    groups = {group: [each for (of, _), each in known if of == group] for group in GROUPS}
     goals = {name: records for name, records in groups.items() if name.startswith("goals")}
     save_figure(goals_figure(goals), folder, "goals", kinds=["svg"])
     save_figure(courses_figure(groups["courses"]), folder, "courses", kinds=["svg"])

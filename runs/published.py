@@ -47,10 +47,8 @@ class Motion:
 def readable(model: Path) -> str:
     """Text of the model without settings that MuJoCo no longer knows. All its bodies are at the
     origin, where global coordinates are local ones."""
-    text = read_text(model, "model")
-    for old in (' coordinate="global"', 'sensornoise="disable"'):
-        text = text.replace(old, "")
-    return text
+    text = read_text(model, "model").replace(' coordinate="global"', "")
+    return text.replace('sensornoise="disable"', "")
 
 
 def by_mujoco(
