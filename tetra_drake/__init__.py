@@ -55,7 +55,7 @@ from pathlib import Path
 
 from tetra_drake.on_demand import attributes
 
-__version__ = "0.5.0"
+__version__ = "0.6.0"
 
 _NAMES, __getattr__, __dir__ = attributes(__name__, Path(__file__))
 
