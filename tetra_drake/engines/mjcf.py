@@ -311,8 +311,9 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
             add_element(tendon, "site", site=structure.node_names[node])
         if pulled or name in motors:
             motor = motors.get(name, name)
-            # A motor's force lengthens its tendon, ours shortens it.
-            add_element(actuators, "motor", name=motor, tendon=name, gear="-1")
+            # A motor's force lengthens its tendon, ours shortens it; a cut cable has none.
+            gear = f"{-cable['intact']:g}"
+            add_element(actuators, "motor", name=motor, tendon=name, gear=gear)
 
 
 def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
