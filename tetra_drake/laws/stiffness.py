@@ -106,7 +106,8 @@ def _cables(robot: Model, forces: Forces) -> list[Springs]:
     p_AB = p_WN[nodes[:, 1]] - p_WN[nodes[:, 0]]
     distance = np.linalg.norm(p_AB, axis=1)
     length = distance.clip(cable.MEETING)
-    along = np.einsum("pi,pj,p->pij", p_AB, p_AB, length**-2.0)
+    unit = p_AB / length[:, None]  # not a power, whose last digits depend on the processor
+    along = np.einsum("pi,pj->pij", unit, unit)
     sideways = parts[of_cable, cable.TENSION] / length
     turning = np.where(distance > cable.MEETING, sideways, 0.0)
     on_line = np.where(counts > 0, 0.0, lengthwise)[of_cable] - turning

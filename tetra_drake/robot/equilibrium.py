@@ -225,7 +225,8 @@ class _Descent:
             shift = self._least
             while (factor := self._factor(self._stiffness, shift)) is None:
                 shift *= 2.0
-            step = np.cos(np.arange(self.force.size))  # any direction
+            # Any direction, not by NumPy's cosine, whose last digits depend on the processor.
+            step = np.array([math.cos(k) for k in range(self.force.size)])
             for _ in range(POWER_STEPS):
                 step = self._solved(factor, step)
                 step *= self._reach / np.abs(step).max()
