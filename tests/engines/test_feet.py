@@ -84,7 +84,7 @@ def test_edges_and_corners_give_no_energy_and_take_it_by_damping_alone(
     terrain, seed, duration, damped
 ):
     energy, depth = energies_of(dropped(terrain, seed, damped=damped, duration=duration))
-    assert depth > 1e-4
+    assert depth > 2e-5  # the stiffest grounds give way by 0.08 mm
     if damped:
         assert np.diff(energy).max() < 1e-3 * (energy[0] - energy[-1])
     else:
