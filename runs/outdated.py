@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from analyse import ROUNDINGS
+from analyse import ROUNDINGS, WAYS
 from parting import asked, made
 from record import EXPERIMENTS, HERE, Experiment
 from script import chosen, script
@@ -41,8 +41,8 @@ EVALUATIONS, ON_DIAGRAM = 300, 60
 PARAMETERS = 1e-6
 """Largest relative difference of parameters that does not count."""
 
-ROUNDED, TIMES = 1e-9, 10
-"""Relative change of gravity that does not count, and number of its multiples that are tried."""
+ROUNDED = 1e-9
+"""Relative change of gravity that does not count; WAYS multiples of it are tried."""
 
 DISTANCE = 1e-3
 """Difference of distances (in) that does not count for any gait. It is less than the difference of
@@ -95,7 +95,7 @@ def goes_elsewhere(run: Run, task: Task, before: float, now: float) -> bool:
     if apart <= DISTANCE or (math.isnan(before) and math.isnan(now)):
         return False
     changes = []
-    for times in range(1, TIMES + 1):
+    for times in range(1, WAYS + 1):
         gravity = run.scenario.robot.gravity * (1.0 + times * ROUNDED)
         evaluation = GaitEvaluation(run.scenario.with_numbers({"robot.gravity": gravity}))(task)
         changes.append(abs(evaluation.metrics.get("distance", math.nan) / INCH - now))
