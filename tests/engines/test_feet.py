@@ -69,7 +69,7 @@ def dropped(terrain: str, seed: int, *, damped: bool, duration: float) -> Scenar
     damping = 2.0 * stiffness if damped else 0.0
     changes = {"ground.stiffness": f"{stiffness} N/m", "ground.damping": f"{damping} N*s/m^2"}
     changes["friction"] = "!Coulomb {static: 0.5, kinetic: 0.4}" if damped else SMOOTH
-    changes["simulation.sample_period"] = "5 ms"
+    changes["simulation.sample_period"] = "1 ms"  # an impact takes some 3 ms
     fine = "!Compiled {tolerance: 1e-6 m/s, max_step: 1 ms}"
     return scenario_of(tree, duration, engine=fine, terrain=RUGGED[terrain], **changes)
 
@@ -84,7 +84,7 @@ def test_edges_and_corners_give_no_energy_and_take_it_by_damping_alone(
     terrain, seed, duration, damped
 ):
     energy, depth = energies_of(dropped(terrain, seed, damped=damped, duration=duration))
-    assert depth > 2e-5  # the stiffest grounds give way by 0.08 mm
+    assert depth > 1e-4
     if damped:
         assert np.diff(energy).max() < 1e-3 * (energy[0] - energy[-1])
     else:
