@@ -253,12 +253,13 @@ def rows() -> Iterable[Any]:
     within |= {"length": 6e-8, "tension": 6e-5, "signal": 1e-9}
     network = {"cpg.signals": "listing", "cpg.start_up": "0.105 s"}
     phases = {"cpg": "!Phase {gain: 2 lbf, start_up: 0.105 s, signals: listing}"}
-    phases["events"] = [{"at": "0.15 s", "cut": ["T1-T2 outer bottom_left"]}]  # a driven cable
+    cut = network | {"events": [{"at": "0.15 s", "cut": ["T1-T2 outer bottom_left"]}]}  # driven
     for count, cpg, other, step in (
         (2, network, FINE[0], 4e-5),
         (5, network, FINE[0], 4e-5),
         (8, network, FINE[0], 4e-5),
-        (3, phases, CONVERGE[0], 1e-5),
+        (3, phases, CONVERGE[1], 4e-5),
+        (4, cut, CONVERGE[0], 1e-5),
     ):
         changes = {"robot.tetrahedra": count, "robot.gravity": 0.0}
         changes |= {"robot.offsets": [[0.0, 0.0, "1 m"]] * count}
