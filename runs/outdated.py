@@ -26,6 +26,7 @@ from parting import asked, made
 from record import EXPERIMENTS, HERE, Experiment
 from script import chosen, script
 
+from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import evaluate_all, evaluator_of
 from tetra_drake.evolution.manifest import MANIFEST
@@ -94,12 +95,13 @@ def goes_elsewhere(run: Run, task: Task, before: float, now: float) -> bool:
     apart = abs(now - before)
     if apart <= DISTANCE or (math.isnan(before) and math.isnan(now)):
         return False
-    changes = []
-    for times in range(1, WAYS + 1):
-        gravity = run.scenario.robot.gravity * (1.0 + times * ROUNDED)
-        evaluation = GaitEvaluation(run.scenario.with_numbers({"robot.gravity": gravity}))(task)
-        changes.append(abs(evaluation.metrics.get("distance", math.nan) / INCH - now))
-    return not apart <= ROUNDINGS * np.nanmax(changes)
+    gravities = run.scenario.robot.gravity * (1.0 + ROUNDED * np.arange(1, WAYS + 1))
+    rounded = [run.scenario.with_numbers({"robot.gravity": each}) for each in gravities.tolist()]
+    with SimulationQueue(available_cores()) as queue:
+        again = [GaitEvaluation(each).on_queue(task, queue) for each in rounded]
+        metrics = [evaluation.result().metrics for evaluation in again]
+    inches = np.array([each.get("distance", math.nan) for each in metrics]) / INCH
+    return not apart <= ROUNDINGS * np.nanmax(np.abs(inches - now))
 
 
 @script
