@@ -19,6 +19,7 @@ from measured import Score, measured_rows, totals
 from page import rendered
 from script import read_settings, script
 
+from tetra_drake.errors import InputError
 from tetra_drake.files import read_json, write_whole
 from tetra_drake.settings.units import INCH
 
@@ -38,13 +39,22 @@ def corpus_rows() -> pandas.DataFrame:
     return rows
 
 
+def released(citation: Path = CITATION) -> datetime.date:
+    """Day of the release that CITATION.cff names. Raises InputError if it names none."""
+    fields, key = read_settings(citation), "date-released"
+    given = fields.get(key) if isinstance(fields, dict) else None
+    try:
+        return datetime.date.fromisoformat(str(given))
+    except ValueError:
+        raise InputError(citation, key, f"is {given!r}, expected a day as 2026-01-31") from None
+
+
 def paper() -> str:
     """Text of the paper, whose date is the day of the last release."""
     rows, runs, predictions = corpus_rows(), tables.load_all(), measured_rows()
-    released = datetime.date.fromisoformat(read_settings(CITATION)["date-released"])
     return rendered(
         "paper.md",
-        date=f"{released:%-d %B %Y}",
+        date=f"{released():%-d %B %Y}",
         runs=runs,
         corpus=rows,
         engines=ENGINES,

@@ -105,7 +105,9 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
         return
     if not (made / MANIFEST).exists() and is_unfinished(shown, scenario):
         thin(shown, made, whole=True)
-    with timed(name, out, anew=not (made / MANIFEST).exists()):
+    if not (made / MANIFEST).exists():
+        save_times(load_times(out) | {name: {}}, out)
+    with timed(name, out):
         # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
         evolved(scenario, made)
     publish(name, experiment, made, out=out)
@@ -149,20 +151,25 @@ def load_times(out: Path) -> dict[str, Any]:
     return read_json(file, "times") if file.exists() else {}
 
 
+def save_times(times: Mapping[str, Any], out: Path) -> None:
+    """Writes the times of the evolutions recorded in the folder `out`."""
+    write_whole(out / TIMES, json.dumps(times, indent=1) + "\n")
+
+
 @contextlib.contextmanager
-def timed(name: str, out: Path, *, anew: bool) -> Iterator[None]:
-    """Context manager that adds the times of an evolution, or of one `anew`, to the times in `out`:
-    wall time, and the time of all cores. Also after an interruption."""
-    before = {} if anew else load_times(out).get(name, {})
+def timed(name: str, out: Path) -> Iterator[None]:
+    """Context manager that adds the times of an evolution to the times in `out`: wall time, and the
+    time of all cores. Also after an interruption."""
     begin, work = time.monotonic(), sum(os.times()[:4])
     try:
         yield
     finally:
-        spent = {"wall_s": time.monotonic() - begin, "cores_s": sum(os.times()[:4]) - work}
-        total = {key: round(before.get(key, 0.0) + spent[key], 1) for key in spent}
-        text = json.dumps(load_times(out) | {name: total}, indent=1)
-        write_whole(out / TIMES, text + "\n")
-        print(f"{name}: {duration(total['wall_s'])}", flush=True)
+        times = load_times(out)
+        spent = {"wall_s": 0.0, "cores_s": 0.0} | times.get(name, {})
+        spent["wall_s"] = round(spent["wall_s"] + time.monotonic() - begin, 1)
+        spent["cores_s"] = round(spent["cores_s"] + sum(os.times()[:4]) - work, 1)
+        save_times(times | {name: spent}, out)
+        print(f"{name}: {duration(spent['wall_s'])}", flush=True)
 
 
 def best_walk(directory: Path) -> SimulationResult:

@@ -1,4 +1,4 @@
-"""What the scripts of this folder have in common: command line, settings, records, figures."""
+"""What these scripts have in common: command line, settings, records, figures, evolution."""
 
 from __future__ import annotations
 

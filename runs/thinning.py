@@ -65,13 +65,10 @@ def thin(source: Path, out: Path, *, initial: bool = False, whole: bool = False)
         thinned = []
         for entry in _entries(run, EVALUATIONS, trial):
             key = trial, entry["index"]
-            fitness, wall_time = entry["fitness"], entry["wall_time_s"]
-            if not whole and key not in matter:
-                entry = _thinned(entry, metrics)
-            if key in rises:
-                entry["fitness"] = fitness
-            entry["wall_time_s"] = _rounded(wall_time, _WALL_TIME_DIGITS)
-            thinned.append(entry)
+            kept = entry if whole or key in matter else _thinned(entry, metrics)
+            exact = {"fitness": entry["fitness"]} if key in rises else {}
+            wall_time = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
+            thinned.append(kept | exact | {"wall_time_s": wall_time})
         again = [e | {"genome": None} for e in _entries(run, REEVALUATIONS, trial)]
         _write(run, out, EVALUATIONS, thinned, trial=trial)
         _write(run, out, ITERATIONS, iterations, trial=trial)
