@@ -46,9 +46,9 @@ def partings(first: Run, second: Run) -> pandas.DataFrame:
     """Where the trials of `first` part from the same trials of `second`. Index: trial.
 
     Columns: evaluations (of `first`), alike (of them, at the begin: the same gaits in both), apart
-    (in, median difference of their distances), farthest (in, the largest), first_best and
-    second_best (in, distance of the fittest gait among as many evaluations of each run as `first`
-    has).
+    (in, median difference of the distances of the initial gaits, which records keep with all
+    digits), farthest (in, the largest difference of all that are alike), first_best and second_best
+    (in, distance of the fittest gait among as many evaluations of each run as `first` has).
     """
     rows = {}
     for trial in range(first.scenario.evolution.trials):
@@ -57,9 +57,10 @@ def partings(first: Run, second: Run) -> pandas.DataFrame:
         alike = [*differs, True].index(True)
         ours, theirs = made(first, trial), made(second, trial)
         apart = (ours["distance_in"] - theirs["distance_in"]).abs().head(alike)
+        initial = apart[ours["iteration"] == 0]
         best = [gaits.loc[gaits["fitness"].head(len(ours)).idxmax()] for gaits in (ours, theirs)]
         bests = (one["distance_in"] for one in best)
-        rows[trial] = [len(ours), alike, apart.median(), apart.max(), *bests]
+        rows[trial] = [len(ours), alike, initial.median(), apart.max(), *bests]
     columns = ["evaluations", "alike", "apart", "farthest", "first_best", "second_best"]
     table = pandas.DataFrame.from_dict(rows, orient="index", columns=columns)
     return table.rename_axis("trial")
